@@ -178,6 +178,23 @@ def not_negative(number: float) -> bool:
     return math.isfinite(number) and number >= 0
 
 
+def check_seconds(dt: float) -> None:
+    """Check that a time between two scans is finite and at least 0.
+
+    Parameters
+    ----------
+    dt : float
+        Seconds.
+
+    Raises
+    ------
+    ArgumentError
+        When it isn't.
+    """
+    if not not_negative(dt):
+        raise ArgumentError("dt", "seconds, not negative", dt)
+
+
 def positive_count(number: float) -> bool:
     """Return whether a number is whole and at least 1.
 

@@ -39,7 +39,7 @@ class GridSpec:
 
     @types_named
     def __post_init__(self) -> None:
-        """Reject a grid that is too large for an array."""
+        """Check that borders and cell are finite, and that each side is a whole number of cells."""
         if not (np.isfinite(self.cell) and self.cell > 0):
             raise ArgumentError("cell", "a positive size in metres", self.cell)
         for axis, low, high in (("x", self.x_min, self.x_max), ("y", self.y_min, self.y_max)):

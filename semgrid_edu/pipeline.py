@@ -106,7 +106,7 @@ def run_frame(frame: Frame, stages: Stages) -> FrameResult:
     clock.lap("sample")
 
     # (p, o) -> g: a small network fuses planes and occupancy into the semantic grid (section 3.4).
-    # Return heights are only for a stage that asks for them, as the paper's network doesn't.
+    # A stage with a third argument also gets the heights of the returns; the paper's network has none.
     log_grid = stages.fuse(planes, occupancy, *stages.return_heights(frame))
     clock.lap("fuse")
 

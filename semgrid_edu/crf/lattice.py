@@ -176,13 +176,14 @@ class PermutohedralLattice:
         numbers, first, members = np.unique(corners @ digits, return_index=True, return_inverse=True)
         ends = np.arange(0, len(corners) + 1, size)
         shares = csr_array((weights.ravel(), members, ends), shape=(n_points, len(numbers)))
-        steps = digits.sum() - size * digits  # so a step along the lattice adds a constant to it
+        steps = digits.sum() - size * digits  # every step along direction j adds steps[j] to a vertex's number
         return cls(corners[first], shares, tuple(_blur(numbers, step) for step in steps))
 
     @property
     def diagonal(self) -> NDArray[np.float64]:
         """k_ii: how much of its value each point gets back, (N,)."""
         half = len(self.blurs) // 2
+        # Each blur is symmetric, so k_ii is the product of what point i gives in one direction and takes in the other.
         given = reduce(matmul, self.blurs[:half], self.shares)  # what a point splats, after half of the blurs
         taken = reduce(matmul, self.blurs[: half - 1 : -1], self.shares)  # what it slices, from before the other half
         return peak(len(self.blurs) - 1) * (given * taken).sum(axis=1)

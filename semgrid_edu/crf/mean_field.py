@@ -281,7 +281,7 @@ def without_border(maps: NDArray, pad: int) -> NDArray:
     return maps[:, pad : height - pad, pad : width - pad]
 
 
-def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
     """Check the CRF's inputs, and return both arrays as float32 or float64.
 
     Parameters

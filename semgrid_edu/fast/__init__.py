@@ -1,7 +1,9 @@
-"""The fast twins: the same names and signatures as in the book, for commands, the demo and long runs.
+"""The fast twins: the same public names as in the book, for commands, the demo and long runs.
 
-Nothing here is needed to understand a stage. Each twin is held equal to the book's version by a property test. The
-compiled ones need numba, the extra `fast`: ``pip install semgrid_edu[fast]``.
+Nothing here is needed to understand a stage. Each twin is held equal to the book's version by a property test, and
+takes the same arguments; only `build_net` and `load_net` choose the sampler themselves. Where a docstring leaves its
+parameters to `move`, say, it means the book's `move`. The compiled ones need numba, the extra `fast`:
+``pip install semgrid_edu[fast]``.
 
 Examples
 --------

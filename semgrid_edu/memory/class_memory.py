@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import softmax
 
-from semgrid_edu.errors import ArgumentError, check_fields, check_shape, not_negative, types_named
+from semgrid_edu.errors import ArgumentError, check_fields, check_seconds, check_shape, not_negative, types_named
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
@@ -91,8 +91,7 @@ class MemoryParams:
         dt : float
             Seconds, not negative.
         """
-        if not not_negative(dt):
-            raise ArgumentError("dt", "seconds, not negative", dt)
+        check_seconds(dt)
         return np.exp(-np.array(self.change_rate) * dt)
 
 

@@ -34,7 +34,7 @@ def smooth_drive(views: Sequence[View], spec: GridSpec, params: MemoryParams | N
     """Return what each cell is, given the frames before and after: forward-backward.
 
     A second memory runs through the drive from its end, where everything moves the other way, and each frame is
-    combined with both memories. For the chain of a single cell `smoothed_classes` is the exact algorithm.
+    combined with both memories.
 
     Parameters
     ----------

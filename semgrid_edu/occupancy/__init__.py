@@ -1,7 +1,7 @@
 """From LIDAR scans to a grid of free, static, dynamic and unknown cells: l -> o (paper, section 3.2).
 
 A `Sensor` turns each scan into `Evidence`; the package's default is `SensorModel`. `steps` holds the four steps of the
-filter, each a pure function on a `FilterState`. `Cmcdot` runs the steps, and `track_drive` runs it over a drive.
+filter, each from one `FilterState` to the next. `Cmcdot` runs the steps, and `track_drive` runs it over a drive.
 `LogOddsGrid` and `Bof` are the filters that came before it: the binary grid, and the exact filter on a lattice of
 velocities. `semgrid_edu.fast` has compiled twins of what takes long.
 

@@ -61,7 +61,7 @@ class VelocityLattice:
     def prior(self) -> NDArray[np.float64]:
         """(V,): the prior over velocities of something about which nothing is known except that it moves; sums to 1.
 
-        The density of `resampling.draw_velocities`, any heading and a speed that is the square of a uniform number, is
+        The density of `state.draw_velocities`, any heading and a speed that is the square of a uniform number, is
         proportional to ``|v|^(-3/2)`` in the plane of velocities.
         """
         speed = np.hypot(*self.velocities.T)

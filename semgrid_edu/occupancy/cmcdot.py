@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import ArgumentError, not_negative
+from semgrid_edu.errors import check_seconds
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up, map_around, scroll, turn_moments
@@ -89,8 +89,7 @@ class Cmcdot:
             When the points aren't a table of finite coordinates, the time is negative or not finite, the sensor doesn't
             turn the scan into evidence, or the resampling doesn't return indices. The state then stays as it was.
         """
-        if not not_negative(dt):
-            raise ArgumentError("dt", "seconds, not negative", dt)
+        check_seconds(dt)
         shift, pose = scroll(self._pose.then(motion), self.spec.cell)
         map_spec = map_around(self.spec, pose.dyaw)
         scan = take_scan(self.params.sensor, points_grid)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.errors import ArgumentError, not_negative, types_named
+from semgrid_edu.errors import ArgumentError, check_seconds, types_named
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up, map_around, scroll
 from semgrid_edu.occupancy.sensor import Evidence, Sensor, SensorModel, check_sensor, evidence_of, take_scan
@@ -139,8 +139,7 @@ class LogOddsGrid:
         `dt` is only checked, because this grid assumes that nothing changes. Parameters and errors are those of
         `Cmcdot.step`.
         """
-        if not not_negative(dt):
-            raise ArgumentError("dt", "seconds, not negative", dt)
+        check_seconds(dt)
         shift, pose = scroll(self._pose.then(motion), self.spec.cell)
         map_spec = map_around(self.spec, pose.dyaw)
         scan = take_scan(self.params.sensor, points_grid)

@@ -94,8 +94,8 @@ class FilterState:
     Parameters
     ----------
     probability : (4, H, W) float
-        P(FREE), P(STATIC), P(DYNAMIC), P(UNKNOWN) of each cell of the map; they sum to 1. Both arrays are float64 in
-        the book and float32 in `fast`.
+        P(FREE), P(STATIC), P(DYNAMIC), P(UNKNOWN) of each cell of the map; they sum to 1. Both arrays are float64
+        after a step of the book and float32 after one of `fast`.
     particles : Particles
         The dynamic mass whose velocity is estimated.
     newborn : (H, W) float

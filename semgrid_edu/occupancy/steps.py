@@ -1,4 +1,7 @@
-"""CMCDOT's four steps, each a pure function, in double precision: move, predict, update, resample (section 3.2)."""
+"""CMCDOT's four steps in double precision: move, predict, update, resample (section 3.2).
+
+Each is a function from state to state that changes no argument, except that `predict` and `resample` draw from `rng`.
+"""
 
 from dataclasses import replace
 
@@ -6,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import expm
 
-from semgrid_edu.errors import ArgumentError, check_shape, not_negative
+from semgrid_edu.errors import check_seconds, check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up
 from semgrid_edu.occupancy.sensor import Evidence
@@ -224,8 +227,7 @@ def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:
     >>> transition_matrix(WorldModel(), dt=3.0)[0].round(2)
     array([0.37, 0.03, 0.01, 0.59])
     """
-    if not not_negative(dt):
-        raise ArgumentError("dt", "seconds, not negative", dt)
+    check_seconds(dt)
     R = np.array(world.rates, dtype=np.float64)
     np.fill_diagonal(R, 0)
     np.fill_diagonal(R, -R.sum(axis=1))

@@ -33,8 +33,9 @@ class Walls:
     Above `running_speed` more is checked; slower things may be people, who walk close to walls. First, the cells beside
     that place count like the place, because a wall that crosses the grid at an angle is a staircase of cells. Second,
     nothing drives through a wall, so the cell where a particle was shortly before counts, too. Without this, particles
-    that start in front of a parked car fly on inside it, where no beam contradicts them. Both looks meet cells of the
-    moving car itself, and some of these are half STATIC. So only what is nearly certain is a wall: P(STATIC)^4.
+    that start in front of a parked car fly on inside it, where no beam contradicts them. Both checks also hit cells
+    that the moving car itself covers, where P(STATIC) can be one half. So only what is nearly certain is a wall:
+    P(STATIC)^4.
 
     *Hedges.* Hedges fake motion: as the car advances, gaps open at the car's own speed. For a particle at that speed a
     cell ahead that borders a STATIC one isn't free space; its own cells aren't there yet, so P(STATIC) counts as it is.

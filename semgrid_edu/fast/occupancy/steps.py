@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from semgrid_edu.errors import ArgumentError, check_shape, not_negative
+from semgrid_edu.errors import ArgumentError, check_seconds, check_shape
 from semgrid_edu.fast.occupancy.cells import look_up
 from semgrid_edu.fast.occupancy.cellwise import bayes, clear_wakes, collide, mix, renormalise, rescale_weights
 from semgrid_edu.fast.occupancy.particles import (
@@ -205,8 +205,7 @@ def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:
     `scipy.linalg.expm` wakes the threads of its BLAS, which keep spinning on the core that processes the scan: a step
     took 28 ms with it instead of 18. Parameters and result are those of `transition_matrix`.
     """
-    if not not_negative(dt):
-        raise ArgumentError("dt", "seconds, not negative", dt)
+    check_seconds(dt)
     R = np.array(world.rates, dtype=np.float64)
     np.fill_diagonal(R, 0)
     leaving = R.sum(axis=1)
