@@ -4,7 +4,7 @@
 twice with the same seed: once the car lies on its top, once it stands in the same place.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from unittest.mock import patch
 
@@ -32,6 +32,8 @@ from worlds.lecture_04_scenes import labelled_frame
 
 FRAMES = 10
 """Frames of a drive, one second; the last has the car 10 to 22 m ahead, and is scored."""
+N_PAIRS = 48
+"""Number of pairs of drives in which the network's grid has cells of the car both ways."""
 FIRST_SEED = 9000
 """The seed of the first drive; no data set of the course has these."""
 ON_ITS_TOP, ON_ITS_WHEELS = "on its top", "on its wheels"
@@ -48,16 +50,15 @@ CASTS: dict[str, Callable[[Traffic], None]] = {ON_ITS_TOP: overturned_car, ON_IT
 """Who is on the street, by how the car lies."""
 
 
-def pairs(seed: int) -> Iterator[tuple[str, SimulatedDrive]]:
-    """Yield the drives of a seed, which differ in nothing but how one car lies.
+def drive_pair(seed: int) -> dict[str, SimulatedDrive]:
+    """Return the drives of a seed, by how one car lies; nothing else differs.
 
     Parameters
     ----------
     seed : int
         Seed for both drives.
     """
-    for name, cast in CASTS.items():
-        yield name, SimulatedDrive(seed, FRAMES, Wishes(cast=cast))
+    return {name: SimulatedDrive(seed, FRAMES, Wishes(cast=cast)) for name, cast in CASTS.items()}
 
 
 def the_car(drives: dict[str, SimulatedDrive]) -> dict[str, object] | None:
@@ -66,7 +67,7 @@ def the_car(drives: dict[str, SimulatedDrive]) -> dict[str, object] | None:
     Parameters
     ----------
     drives : dict of str to SimulatedDrive
-        From `pairs`.
+        From `drive_pair`.
     """
     objects = drives[ON_ITS_TOP].objects((FRAMES - 1) * PERIOD)
     return next((one for one in objects if one.get("overturned", False)), None)
@@ -106,15 +107,8 @@ def called_car(matrix: NDArray) -> float:
     return row[KITTI_14.index("car")] / row.sum()
 
 
-def compare_pairs(n_pairs: int = 48, seed: int = FIRST_SEED) -> dict[str, object]:
+def compare_pairs() -> dict[str, object]:
     """Compare overturned cars with the same cars on their wheels, by the shipped compact SegNet.
-
-    Parameters
-    ----------
-    n_pairs : int
-        Number of pairs of drives in which the camera sees cells of the car in both ways.
-    seed : int
-        The seed of the first pair.
 
     Returns
     -------
@@ -122,11 +116,12 @@ def compare_pairs(n_pairs: int = 48, seed: int = FIRST_SEED) -> dict[str, object
         "called car": the share of the cells with an interval over drives, for each way, and their "difference";
         "counts": cells and cells called car by drive; and what made them.
     """
-    weights, net, seeds = sample_weights(), None, []
+    weights, net = sample_weights(), None
+    seed, seeds = FIRST_SEED, []
     matrices: dict[str, list[NDArray]] = {name: [] for name in CASTS}
-    bar = trange(n_pairs, unit="pair")
-    while len(seeds) < n_pairs:
-        drives = dict(pairs(seed))
+    bar = trange(N_PAIRS, unit="pair")
+    while len(seeds) < N_PAIRS:
+        drives = drive_pair(seed)
         net = net or load_net(weights, drives[ON_ITS_TOP].rig.camera)
         car = the_car(drives)
         counted = {name: count(drive, car, net) for name, drive in drives.items()} if car else {}
@@ -152,17 +147,15 @@ def compare_pairs(n_pairs: int = 48, seed: int = FIRST_SEED) -> dict[str, object
     }
 
 
-def main(out: Path, pairs: int = 48) -> None:
+def main(out: Path) -> None:
     """Compare, write the result as JSON, and print it.
 
     Parameters
     ----------
     out : Path
         A JSON file.
-    pairs : int
-        Number of pairs of drives.
     """
-    result = compare_pairs(pairs)
+    result = compare_pairs()
     write_json(out, result)
     for name, interval in [*result["called car"].items(), ("difference", result["difference"])]:
         print(f"{name:<14} {100 * interval['mean']:.1f} ({100 * interval['low']:.1f} to {100 * interval['high']:.1f})")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from worlds.lecture_12_overturned import FIRST_SEED, ON_ITS_TOP, ON_ITS_WHEELS, called_car, count, pairs, the_car
+from worlds.lecture_12_overturned import FIRST_SEED, ON_ITS_TOP, ON_ITS_WHEELS, called_car, count, drive_pair, the_car
 
 from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.fast import load_net
@@ -14,7 +14,7 @@ LAST = 0.9
 
 @pytest.fixture(scope="module")
 def drives():
-    return dict(pairs(FIRST_SEED))
+    return drive_pair(FIRST_SEED)
 
 
 def test_the_drives_differ_in_nothing_but_how_one_car_lies(drives):
