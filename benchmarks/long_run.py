@@ -114,7 +114,7 @@ def long_run(
         points = scan_boxes(
             scene_at(time), pose.dx, pose.dy, pose.dyaw, columns=150, rings=24, field=120, noise=0.02, rng=rng
         )
-        motion = PlanarMotion(*before.to_now(np.array([pose.dx, pose.dy])), pose.dyaw - before.dyaw)
+        motion = PlanarMotion(*before.child_from_parent(np.array([pose.dx, pose.dy])), pose.dyaw - before.dyaw)
         belief, before = tracker.step(points, motion, dt), pose
         worst_sum = np.maximum(worst_sum, np.abs(belief.probability.sum(axis=0, dtype=np.float64) - 1).max())
         lowest = np.minimum(lowest, belief.probability.min())

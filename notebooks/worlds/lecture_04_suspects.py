@@ -61,7 +61,7 @@ def arrivals_barred() -> AbstractContextManager:
     """
 
     def collide(mixed, newborn, going, stays, arrives, doubtful):
-        everything = np.minimum(arrives, np.float32(cellwise.CERTAIN))
+        everything = np.minimum(arrives, np.float32(cellwise.MAX_MOVE_PROBABILITY))
         return cellwise.collide(mixed, newborn, going, stays, arrives, everything)
 
     return patch("semgrid_edu.fast.occupancy.steps.collide", collide)

@@ -11,7 +11,7 @@ from semgrid_edu.fast.occupancy.cmcdot import DriveTracker
 from semgrid_edu.memory import MemoryParams
 from semgrid_edu.networks import SemanticGridNet
 from semgrid_edu.occupancy import CmcdotParams
-from semgrid_edu.stages import Stages
+from semgrid_edu.stages.stages import Stages, network_stages
 
 
 def fast_stages(
@@ -26,11 +26,11 @@ def fast_stages(
 
     Parameters and errors are those of `Stages.of`.
     """
-    book = Stages.of(with_fast_sampler(net), memory=memory)
-    spec = book.architecture.grid
+    spec = net.need_architecture().grid
     crf = crf or CrfParams.for_cells(spec.cell)
 
     def refine(log_g: NDArray, o: NDArray) -> NDArray:
         return mean_field(-log_g, o, crf)
 
-    return replace(book, track=DriveTracker(spec, occupancy, seed, keep_steps), refine=refine)
+    track = DriveTracker(spec, occupancy, seed, keep_steps)
+    return replace(network_stages(with_fast_sampler(net), memory), track=track, refine=refine)

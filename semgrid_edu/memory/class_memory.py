@@ -504,5 +504,5 @@ def places_of(spec: GridSpec, source: GridSpec, pose: PlanarMotion) -> NDArray[n
     pose : PlanarMotion
         Pose of the frame of `spec` in that of `source`, metres and radians.
     """
-    centers = pose.to_previous(spec.centers().reshape(-1, 2))
+    centers = pose.parent_from_child(spec.centers().reshape(-1, 2))
     return cells_of(centers, source).reshape(spec.shape)

@@ -9,11 +9,11 @@ from semgrid_edu.errors import check_shape
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.bof_state import BofParams, BofState, origins, whole_cells
 from semgrid_edu.occupancy.cmcdot import local_belief
-from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up, map_around, scroll, shift
+from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up, map_around, scroll, shift_plane
 from semgrid_edu.occupancy.sensor import Evidence, evidence_of, take_scan
-from semgrid_edu.occupancy.state import Belief, FilterState, Particles, State, ratio, slow_down
-from semgrid_edu.occupancy.steps import mix, strike_out, transition_matrix, update
-from semgrid_edu.occupancy.walls import SURE, Walls, largest_nearby, strike_out_wakes, velocity_of
+from semgrid_edu.occupancy.state import Belief, State, moving_share
+from semgrid_edu.occupancy.steps import bayes, initialise_unknown, mix, strike_out, transition_matrix
+from semgrid_edu.occupancy.walls import WALL_EXPONENT, Walls, largest_nearby, strike_out_wakes, velocity_of
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
@@ -98,14 +98,13 @@ def _shifted(
     state: BofState, cells: NDArray[np.int64], stays_dynamic: float, params: BofParams, dt: float
 ) -> tuple[NDArray, NDArray[np.float64]]:
     """Return the mass of each velocity in its new cells, (V, H, W), and all that moves in its old cells, (H, W)."""
-    particles = Particles(np.zeros_like(state.velocity), state.velocity, np.ones(len(state.velocity)))
     world = params.world
-    kept = stays_dynamic * slow_down(particles, world.stop_rate, world.stop_speed, dt).weight
+    kept = stays_dynamic * moving_share(state.velocity, world.stop_rate, world.stop_speed, dt)
     occupied = np.zeros_like(state.occupied)
     going = np.zeros(state.free.shape)
     for k in range(1, len(occupied)):
         mass = float(kept[k]) * _accelerated(state, k, params, dt)
-        occupied[k] = shift(mass, cells[k])
+        occupied[k] = shift_plane(mass, cells[k])
         going += mass
     return occupied, going
 
@@ -127,7 +126,7 @@ def _blocked(
     It can't if the cell is STATIC. What `walls` doubts is that of `Walls.doubt`, for whole planes: a plane shifted the
     other way shows in each cell the value at the place where its mass is at another time.
     """
-    wall = mixed[STATIC] ** SURE
+    wall = mixed[STATIC] ** WALL_EXPONENT
     nearby = largest_nearby(wall)
     runs = np.hypot(*velocity.T) > walls.running_speed
     keeps = walls.keeps_pace(velocity, car_velocity, spec.cell)
@@ -170,17 +169,16 @@ def bof_update(state: BofState, spec: GridSpec, evidence: Evidence, params: BofP
         When state or evidence cover cells other than `spec`, or another lattice.
     """
     check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
-    before = state.probability
-    given = update(FilterState(before, Particles.none(), np.zeros(spec.shape)), spec, evidence, params.world)
-    factor = ratio(np.maximum(given.probability[DYNAMIC] - given.newborn, 0), before[DYNAMIC])
+    check_shape("evidence", evidence.free, spec.shape)
+    prior, born = initialise_unknown(state.probability, evidence.seen, params.world)
+    probability, factor = bayes(prior, evidence)
     occupied = np.zeros_like(state.occupied)
     for k in range(1, len(occupied)):
-        occupied[k] = state.occupied[k] * factor + params.lattice.prior[k] * given.newborn
-    probability = given.probability
+        occupied[k] = factor * (state.occupied[k] + params.lattice.prior[k] * born)
     left = np.zeros(spec.shape)
     for mass, back in zip(occupied[1:], origins(state.velocity[1:], spec, params.world.walls), strict=True):
         left += _elsewhere(mass, -back)
-    probability = strike_out_wakes(probability, left, evidence.occupied == evidence.free)
+    probability = strike_out_wakes(probability, left, ~evidence.seen)
     occupied[0] = probability[STATIC]
     dtype = occupied.dtype
     free = probability[FREE].astype(dtype)
@@ -274,4 +272,4 @@ def _elsewhere(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
 
     At no distance nothing has moved, so there is no other place to look at.
     """
-    return shift(plane, -cells) if cells.any() else np.zeros_like(plane)
+    return shift_plane(plane, -cells) if cells.any() else np.zeros_like(plane)

@@ -12,7 +12,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up, map_around, scroll, turn_moments
 from semgrid_edu.occupancy.sensor import Evidence, evidence_of, take_scan
 from semgrid_edu.occupancy.state import OUTSIDE, Belief, FilterState, Particles, State, cells_of, transform
-from semgrid_edu.occupancy.steps import NOTHING_KNOWN, move, predict, resample, update
+from semgrid_edu.occupancy.steps import NOTHING_KNOWN, bayes, initialise_unknown, move, predict, resample, update
 from semgrid_edu.occupancy.world import CmcdotParams, WorldModel
 
 
@@ -147,11 +147,11 @@ def local_belief(
     map_spec, spec : GridSpec
         The cells of the map, (H, W), and those of the vehicle, (H', W').
     world : WorldModel
-        What `update` assumes.
+        What UNKNOWN cells turn out to be, `first_sight`.
     """
     here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, pose)
-    prior = FilterState(here, Particles.none(), np.zeros(spec.shape))
-    probability = update(prior, spec, in_grid, world).probability.astype(np.float32)
+    prior, _ = initialise_unknown(here, in_grid.seen, world)
+    probability = bayes(prior, in_grid)[0].astype(np.float32)
     mean, covariance = velocity
     moments = np.concatenate([mean, covariance.reshape(4, *map_spec.shape)]).astype(np.float32)
     moments = look_up(moments, np.full(6, np.nan, np.float32), map_spec, spec, pose)
@@ -212,6 +212,9 @@ class DriveTracker:
         Whether each belief also contains the state of the filter's map after each step (`Belief.steps`).
     """
 
+    filter_class = Cmcdot
+    """The filter to run; the fast twin of this class runs the compiled one."""
+
     def __init__(
         self,
         spec: GridSpec,
@@ -219,7 +222,7 @@ class DriveTracker:
         seed: int | np.random.Generator = 0,
         keep_steps: bool = False,
     ) -> None:
-        self.filter = Cmcdot(spec, params, seed, keep_steps)
+        self.filter = self.filter_class(spec, params, seed, keep_steps)
         self._before: Frame | None = None
 
     def step(self, frame: Frame) -> Belief:

@@ -12,18 +12,21 @@ from semgrid_edu.grid import GridSpec
 
 @dataclass(frozen=True)
 class PlanarMotion:
-    """The pose of the vehicle now, in the grid frame of the previous instant.
+    """The pose of one frame in the plane, the child, in another, its parent.
+
+    As a motion it is the pose of the vehicle now (child) in the grid frame of the previous instant (parent). As a pose
+    it says where the vehicle (child) is in a map (parent).
 
     Parameters
     ----------
     dx, dy : float
-        Displacement forward and to the left, metres.
+        Displacement forward and to the left, along the parent's axes, metres.
     dyaw : float
         Turn to the left, radians.
 
     Examples
     --------
-    >>> PlanarMotion(1.0, 0.0, np.pi / 2).to_previous(np.array([[2.0, 0.0]])).round(6)
+    >>> PlanarMotion(1.0, 0.0, np.pi / 2).parent_from_child(np.array([[2.0, 0.0]])).round(6)
     array([[1., 2.]])
     """
 
@@ -60,33 +63,33 @@ class PlanarMotion:
 
     @property
     def rotation(self) -> NDArray[np.float64]:
-        """(2, 2): turns vectors along the axes of now into vectors along the axes of the previous instant."""
+        """(2, 2): turns vectors along the child's axes into vectors along the parent's."""
         cos, sin = np.cos(self.dyaw), np.sin(self.dyaw)
         return np.array([[cos, -sin], [sin, cos]])
 
     @property
     def inverse(self) -> "PlanarMotion":
-        """The pose of the previous instant, in the grid frame of now."""
-        dx, dy = self.to_now(np.zeros(2))
+        """The pose of the parent in the child."""
+        dx, dy = self.child_from_parent(np.zeros(2))
         return PlanarMotion(float(dx), float(dy), -self.dyaw)
 
-    def to_previous(self, xy: NDArray) -> NDArray:
-        """Return the coordinates in the previous frame of points given in the frame of now.
+    def parent_from_child(self, xy: NDArray) -> NDArray:
+        """Return the coordinates in the parent of points given in the child, for example in the map of scan points.
 
         Parameters
         ----------
         xy : (..., 2) float
-            x and y in the grid frame of now, metres.
+            x and y in the child, metres.
         """
         return xy @ self.rotation.T + (self.dx, self.dy)
 
-    def to_now(self, xy: NDArray) -> NDArray:
-        """Return the coordinates in the frame of now of points given in the previous frame.
+    def child_from_parent(self, xy: NDArray) -> NDArray:
+        """Return the coordinates in the child of points given in the parent.
 
         Parameters
         ----------
         xy : (..., 2) float
-            x and y in the grid frame of the previous instant, metres.
+            x and y in the parent, metres.
         """
         return (xy - (self.dx, self.dy)) @ self.rotation
 
@@ -98,7 +101,7 @@ class PlanarMotion:
         motion : PlanarMotion
             The motion that follows, in the frame to which this one leads.
         """
-        dx, dy = self.to_previous(np.array([motion.dx, motion.dy]))
+        dx, dy = self.parent_from_child(np.array([motion.dx, motion.dy]))
         return PlanarMotion(float(dx), float(dy), self.dyaw + motion.dyaw)
 
 
@@ -124,7 +127,7 @@ def map_around(spec: GridSpec, yaw: float) -> GridSpec:
     GridSpec(x_min=-3.0, x_max=3.0, y_min=-1.0, y_max=11.0, cell=1)
     """
     corners = np.array([(x, y) for x in (spec.x_min, spec.x_max) for y in (spec.y_min, spec.y_max)])
-    turned = PlanarMotion(dyaw=yaw).to_previous(corners)
+    turned = PlanarMotion(dyaw=yaw).parent_from_child(corners)
     border = np.array([spec.x_max, spec.y_max])  # borders of the map's cells are whole cells away from here
     rounding = 1e-6  # of a cell
     lowest = np.floor((turned.min(axis=0) - border) / spec.cell - 0.5 + rounding)
@@ -177,14 +180,14 @@ def look_up(values: NDArray, outside: NDArray, source: GridSpec, target: GridSpe
     pose : PlanarMotion
         Pose of the frame of `target` in that of `source`, metres and radians.
     """
-    rows, cols, inside = source.cells(pose.to_previous(target.centers().reshape(-1, 2)))
+    rows, cols, inside = source.cells(pose.parent_from_child(target.centers().reshape(-1, 2)))
     cells = rows * source.shape[1] + cols
     found = np.take(values.reshape(len(values), -1), cells, axis=1)  # unlike values[:, rows, cols], plane after plane
     found[:, ~inside] = np.asarray(outside)[:, None]
     return found.reshape(len(values), *target.shape)
 
 
-def shift(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
+def shift_plane(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
     """Move a plane by whole cells along x and y, which is up and to the left; zeros come in from outside.
 
     Parameters

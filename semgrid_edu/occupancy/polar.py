@@ -122,7 +122,7 @@ def beyond_reach(reach: NDArray, spec: GridSpec, pose: PlanarMotion) -> NDArray[
     (H, W) float64
         Metres; negative for cells whose centre the beam passes.
     """
-    x, y = np.moveaxis(pose.to_now(spec.centers()), -1, 0)
+    x, y = np.moveaxis(pose.child_from_parent(spec.centers()), -1, 0)
     return np.hypot(x, y) - reach[beams_of(x, y, len(reach))]
 
 

@@ -58,6 +58,11 @@ class Evidence:
             if not (least := np.min(getattr(self, name), initial=0)) >= 0:  # NaN isn't either
                 raise ArgumentError(name, "likelihoods, not negative", least)
 
+    @property
+    def seen(self) -> NDArray[np.bool_]:
+        """(H, W): whether the scan tells anything about the cell."""
+        return self.occupied != self.free
+
 
 @runtime_checkable
 class Measurement(Protocol):
@@ -74,8 +79,8 @@ class Measurement(Protocol):
         spec : GridSpec
             The cells, (H, W).
         pose : PlanarMotion
-            Pose of the vehicle in the frame of `spec`, metres and radians. So `pose.to_previous(points[:, :2])` gives
-            the x and y of the scan's points in the frame of `spec`, and `spec.cells` tells their cells.
+            Pose of the vehicle in the frame of `spec`, metres and radians. So `pose.parent_from_child(points[:, :2])`
+            gives the x and y of the scan's points in the frame of `spec`, and `spec.cells` tells their cells.
 
         Returns
         -------
@@ -366,7 +371,7 @@ class Scan:
         """Look each cell up in its beam. Parameters and result are those of `Measurement.evidence`."""
         height = self.points[:, 2]
         obstacle = (height >= self.sensor.obstacle_min) & (height <= self.sensor.obstacle_max)
-        xy = pose.to_previous(self.points[:, :2])
+        xy = pose.parent_from_child(self.points[:, :2])
         obstacles = count_in_cells(xy[obstacle], spec)
         ground = count_in_cells(xy[height < self.sensor.obstacle_min], spec)
         beyond = beyond_reach(self.reach, spec, pose)
@@ -408,8 +413,7 @@ def prepare_scan(points: NDArray, sensor: SensorModel) -> NDArray[np.floating]:
     (M, 3) float32 or float64
         The other returns, in their order: x, y, and the height above the ground at that place (m).
     """
-    edge = edge_of_splits(points, sensor.edge)
-    points = without_own_returns(points, sensor.vehicle, edge, sensor.obstacle_min)
+    points = without_own_returns(points, sensor)
     if sensor.ground is not None:
         points[:, 2] = height_above_ground(points, sensor.ground)
     return points
@@ -430,9 +434,7 @@ def edge_of_splits(points: NDArray, edge: float) -> float:
     return edge if measured else 0.0
 
 
-def without_own_returns(
-    points: NDArray, vehicle: tuple[float, float, float, float], edge: float, low: float
-) -> NDArray:
+def without_own_returns(points: NDArray, sensor: SensorModel) -> NDArray:
     """Remove the returns that come from the vehicle itself, and from beams that its edge splits.
 
     They would travel along with the vehicle for ever, and hide what is behind them. Beside KITTI's car, some 30 returns
@@ -444,12 +446,8 @@ def without_own_returns(
     points : (N, 3+) float
         Returns in the grid frame of the vehicle, metres; a fourth column is reflectance. A fifth column is not 0 for
         the vehicle's own returns. With it, exactly those are removed, and outline and edge don't matter.
-    vehicle : (float, float, float, float)
-        Outline of the vehicle: x_min, x_max, y_min, y_max in its grid frame, metres.
-    edge : float
-        How far outside the outline returns with a reflectance of 0 are removed as well, metres.
-    low : float
-        Returns are removed from this height on, metres; lower ones come from the ground.
+    sensor : SensorModel
+        The outline of its `vehicle`, the `edge` around it, and `obstacle_min`: lower returns come from the ground.
 
     Returns
     -------
@@ -461,10 +459,10 @@ def without_own_returns(
     if columns > 4:  # the reader knows which returns are the vehicle's own
         return points[points[:, 4] == 0, :3]
     no_light = points[:, 3] == 0 if columns > 3 else np.zeros(len(points), bool)
-    around = np.where(no_light, edge, 0.0)
-    x_min, x_max, y_min, y_max = vehicle
+    around = np.where(no_light, edge_of_splits(points, sensor.edge), 0.0)
+    x_min, x_max, y_min, y_max = sensor.vehicle
     beside = (x > x_min - around) & (x < x_max + around) & (y > y_min - around) & (y < y_max + around)
-    return points[~(beside & (z >= low)), :3]
+    return points[~(beside & (z >= sensor.obstacle_min)), :3]
 
 
 def likelihoods(obstacles: NDArray, free: NDArray, sensor: SensorModel) -> Evidence:

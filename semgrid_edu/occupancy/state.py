@@ -150,7 +150,7 @@ def check_part(name: str, part: object, protocol: type, example: str) -> None:
         raise ArgumentError(name, expected, type(part).__name__)
 
 
-CERTAIN = 1 - 1e-3
+MAX_MOVE_PROBABILITY = 1 - 1e-3
 """The largest probability with which something arrives in a cell or has left it: below 1, so a scan can contradict."""
 
 
@@ -232,24 +232,24 @@ def fly(particles: Particles, max_acceleration: float, dt: float, rng: np.random
     return Particles(x, v + a * dt, particles.weight)
 
 
-def slow_down(particles: Particles, stop_rate: float, stop_speed: float, dt: float) -> Particles:
-    """Reduce each weight to the share that keeps moving.
+def moving_share(velocity: NDArray, stop_rate: float, stop_speed: float, dt: float) -> NDArray[np.floating]:
+    """Return which share of its mass still moves after a time step, for each velocity, (N,).
 
-    A particle of speed v stops at the rate stop_rate exp(-v^2 / (2 stop_speed^2)), so after `dt` the share
-    exp(-rate dt) of its weight still moves.
+    Something of speed v stops at the rate stop_rate exp(-v^2 / (2 stop_speed^2)), so after `dt` the share
+    exp(-rate dt) still moves.
 
     Parameters
     ----------
-    particles : Particles
-        N particles at the start of the time step.
+    velocity : (N, 2) float
+        Velocities at the start of the time step, m/s.
     stop_rate, stop_speed : float
         Rate of stopping at v = 0, 1/s, and the speed above which it falls, m/s.
     dt : float
         The time step, seconds.
     """
-    speed = np.linalg.norm(particles.velocity.astype(np.float64), axis=1)
+    speed = np.linalg.norm(velocity.astype(np.float64), axis=1)
     rate = stop_rate * np.exp(-(speed**2) / (2 * stop_speed**2))
-    return Particles(particles.position, particles.velocity, particles.weight * np.exp(-rate * dt))
+    return np.exp(-rate * dt)
 
 
 def transform(particles: Particles, motion: PlanarMotion) -> Particles:
@@ -262,7 +262,7 @@ def transform(particles: Particles, motion: PlanarMotion) -> Particles:
     motion : PlanarMotion
         Pose of the new frame in the old one, metres and radians.
     """
-    position = motion.to_now(particles.position.astype(np.float64))
+    position = motion.child_from_parent(particles.position.astype(np.float64))
     velocity = particles.velocity @ motion.rotation
     return Particles(position, velocity, particles.weight)
 

@@ -14,7 +14,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up
 from semgrid_edu.occupancy.sensor import Evidence
 from semgrid_edu.occupancy.state import (
-    CERTAIN,
+    MAX_MOVE_PROBABILITY,
     FilterState,
     Particles,
     State,
@@ -23,8 +23,8 @@ from semgrid_edu.occupancy.state import (
     draw_again,
     draw_newborn,
     fly,
+    moving_share,
     ratio,
-    slow_down,
     transform,
     weight_in_cells,
 )
@@ -131,31 +131,38 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     """
     check_shape("state", state.newborn, spec.shape)
     check_shape("evidence", evidence.free, spec.shape)
-    seen = evidence.occupied != evidence.free
-    prior = initialise_unknown(state, seen, world)
-    posterior, factor = bayes(prior.probability, evidence)
-    cells = cells_of(prior.particles.position, spec)
-    particles = replace(prior.particles, weight=prior.particles.weight * at_cells(factor, cells))
-    posterior = world.walls.clear_wakes(posterior, particles, cells, ~seen, spec)
-    return FilterState(posterior, particles, prior.newborn * factor)
+    prior, born = initialise_unknown(state.probability, evidence.seen, world)
+    posterior, factor = bayes(prior, evidence)
+    cells = cells_of(state.particles.position, spec)
+    particles = replace(state.particles, weight=state.particles.weight * at_cells(factor, cells))
+    posterior = world.walls.clear_wakes(posterior, particles, cells, ~evidence.seen, spec)
+    return FilterState(posterior, particles, (state.newborn + born) * factor)
 
 
-def initialise_unknown(state: FilterState, seen: NDArray[np.bool_], world: WorldModel) -> FilterState:
+def initialise_unknown(
+    probability: NDArray, seen: NDArray[np.bool_], world: WorldModel
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """In cells that this scan observes, distribute the UNKNOWN mass over the other states.
 
     Parameters
     ----------
-    state : FilterState
-        The belief before the scan.
+    probability : (4, H, W) float
+        The four states before the scan.
     seen : (H, W) bool
-        Whether the scan tells anything about the cell.
+        Whether the scan tells anything about the cell, `Evidence.seen`.
     world : WorldModel
-        What UNKNOWN cells turn out to be, `first_sight`; the dynamic part is newborn.
+        What UNKNOWN cells turn out to be, `first_sight`.
+
+    Returns
+    -------
+    probability : (4, H, W) float64
+        The four states; UNKNOWN is 0 in the cells that are seen.
+    born : (H, W) float64
+        What P(DYNAMIC) has gained: newborn mass, which has no particles.
     """
-    revealed = np.where(seen, state.probability[UNKNOWN], 0).astype(np.float64)
+    revealed = np.where(seen, probability[UNKNOWN], 0).astype(np.float64)
     shares = np.array([*world.first_sight, -1.0])
-    probability = state.probability + shares[:, None, None] * revealed
-    return FilterState(probability, state.particles, state.newborn + shares[DYNAMIC] * revealed)
+    return probability + shares[:, None, None] * revealed, shares[DYNAMIC] * revealed
 
 
 def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.random.Generator) -> FilterState:
@@ -249,8 +256,8 @@ def stay_in_motion(particles: Particles, world: WorldModel, M: NDArray, dt: floa
     dt : float
         The time step, seconds.
     """
-    moving = slow_down(particles, world.stop_rate, world.stop_speed, dt)
-    return replace(moving, weight=moving.weight * M[DYNAMIC, DYNAMIC])
+    share = moving_share(particles.velocity, world.stop_rate, world.stop_speed, dt)
+    return replace(particles, weight=particles.weight * share * M[DYNAMIC, DYNAMIC])
 
 
 def mix(
@@ -342,7 +349,7 @@ def strike_out(arrives: NDArray, possible: NDArray) -> tuple[NDArray[np.float64]
     Parameters
     ----------
     arrives : (H, W) float
-        Dynamic mass that arrives in the cell. It may exceed 1 where particles crowd; then a is `CERTAIN`.
+        Dynamic mass that arrives in the cell. It may exceed 1 where particles crowd; then a is `MAX_MOVE_PROBABILITY`.
     possible : (H, W) float
         The part of it that can be true.
 
@@ -353,7 +360,7 @@ def strike_out(arrives: NDArray, possible: NDArray) -> tuple[NDArray[np.float64]
     take : (H, W) float64
         Factor of the possible arrivals, (a / arrives) / (1 - i).
     """
-    a = np.minimum(arrives, CERTAIN)
+    a = np.minimum(arrives, MAX_MOVE_PROBABILITY)
     share = ratio(a, arrives)
     consistent = 1 - (a - share * possible)
     return (1 - a) / consistent, share / consistent

@@ -13,12 +13,21 @@ from scipy.ndimage import maximum_filter
 
 from semgrid_edu.errors import check_fields, not_negative, types_named
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.state import CERTAIN, OUTSIDE, Particles, State, at_cells, cells_of, ratio, weight_in_cells
+from semgrid_edu.occupancy.state import (
+    MAX_MOVE_PROBABILITY,
+    OUTSIDE,
+    Particles,
+    State,
+    at_cells,
+    cells_of,
+    ratio,
+    weight_in_cells,
+)
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 
-SURE = 4
-"""Power of P(STATIC) by which a cell is a wall to something fast: 0.9 counts as 0.66, 0.5 as 0.06."""
+WALL_EXPONENT = 4
+"""To something fast, a cell is a wall by P(STATIC) to the power of this: 0.9 counts as 0.66, 0.5 as 0.06."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +153,7 @@ class Walls:
             self._other_cells(particles, cells, spec, fraction) for fraction in (-1, -self.second_look, 1)
         )
         runs = np.hypot(*particles.velocity.T) > self.running_speed
-        wall = mixed[STATIC] ** SURE
+        wall = mixed[STATIC] ** WALL_EXPONENT
         nearby = largest_nearby(wall)
         out_of_a_wall = np.where(runs, at_cells(nearby, before), at_cells(mixed[STATIC], before))
         through_a_wall = runs * at_cells(wall, shortly_before)
@@ -203,11 +212,11 @@ def strike_out_wakes(posterior: NDArray, left: NDArray, hidden: NDArray) -> NDAr
     posterior : (4, H, W) float
         The four states given the scan.
     left : (H, W) float
-        Dynamic mass that has left each cell; a is at most `CERTAIN`.
+        Dynamic mass that has left each cell; a is at most `MAX_MOVE_PROBABILITY`.
     hidden : (H, W) bool
         Cells about which the scan tells nothing. Others stay as they are, because there the scan decides.
     """
-    a = np.where(hidden, np.minimum(left, CERTAIN), 0)
+    a = np.where(hidden, np.minimum(left, MAX_MOVE_PROBABILITY), 0)
     s = posterior[STATIC]
     static = (1 - a) * s / (1 - a * s)
     return np.stack([posterior[FREE] + (s - static), static, posterior[DYNAMIC], posterior[UNKNOWN]])

@@ -4,13 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.grid import GridSpec
-from semgrid_edu.occupancy.sensor import SensorModel, edge_of_splits, without_own_returns
+from semgrid_edu.occupancy.sensor import SensorModel, without_own_returns
 
 
 def cell_heights(points: NDArray, spec: GridSpec) -> NDArray[np.float64]:
     """Return the lowest and the highest return of each cell, (2, H, W), metres above flat ground.
 
-    NaN in a cell without a return. The vehicle's own returns are left out, as the filter's default `SensorModel` does.
+    NaN in a cell without a return. The vehicle's own returns are left out by the rule of the default `SensorModel`,
+    whatever sensor the filter has: a network must see the heights that it was trained on.
 
     Parameters
     ----------
@@ -24,8 +25,7 @@ def cell_heights(points: NDArray, spec: GridSpec) -> NDArray[np.float64]:
     >>> cell_heights(np.array([[9.5, 0.5, 0.1], [9.2, 0.7, 1.4]]), GridSpec(9, 10, 0, 1, 1.0)).ravel()
     array([0.1, 1.4])
     """
-    sensor = SensorModel()
-    points = without_own_returns(points, sensor.vehicle, edge_of_splits(points, sensor.edge), sensor.obstacle_min)
+    points = without_own_returns(points, SensorModel())
     rows, cols, inside = spec.cells(points)
     cells = rows[inside], cols[inside]
     z = points[inside, 2].astype(np.float64)

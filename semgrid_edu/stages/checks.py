@@ -42,12 +42,12 @@ class CheckedStage:
         self, name: str, stage: Any, shape: tuple[int, ...], first_frame: int = 0, of_probabilities: bool = False
     ) -> None:
         self.name = name
-        self.stage = self.__wrapped__ = stage  # so that `inspect.signature` gives the stage's own
+        self.stage = stage
+        self.__wrapped__ = stage  # so that `inspect.signature` gives the stage's own
         self.of_probabilities = of_probabilities
         self.shape = shape
         self.frame = first_frame - 1
-        module = getattr(stage, "__module__", None) or type(stage).__module__
-        self.is_ours = str(module).startswith("semgrid_edu.")
+        self.is_ours = str(getattr(stage, "__module__", None)).startswith("semgrid_edu.")
 
     def __str__(self) -> str:
         """Say which stage, where it is written, and at which frame: "refine (my_stages.py, line 12), frame 3"."""

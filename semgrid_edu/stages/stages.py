@@ -152,27 +152,14 @@ class Stages:
         >>> own = Stages.of(load_net(sample_weights(), drive.camera))                   # doctest: +SKIP
         >>> dataclasses.replace(own, refine=my_refine)                                  # doctest: +SKIP
         """
-        architecture = net.need_architecture()
-        crf = crf or CrfParams.for_cells(architecture.grid.cell)
-
-        def fuse(p: Tensor, o: Tensor) -> Tensor:
-            return net.fuse(p, o).log_softmax(dim=1)
-
-        def fuse_at_returns(p: Tensor, o: Tensor, return_heights: Tensor) -> Tensor:
-            return net.fuse(p, o, return_heights=return_heights).log_softmax(dim=1)
+        spec = net.need_architecture().grid
+        crf = crf or CrfParams.for_cells(spec.cell)
 
         def refine(log_g: NDArray, o: NDArray) -> NDArray:
             return mean_field(-log_g, o, crf)
 
-        return cls(
-            track=DriveTracker(architecture.grid, occupancy, seed, keep_steps),
-            segment=_on_arrays(net.segment),
-            sample=_on_arrays(net.sample),
-            fuse=_on_arrays(fuse_at_returns if architecture.uses_return_heights else fuse),
-            refine=refine,
-            architecture=architecture,
-            remember=_memory(memory, architecture),
-        )
+        track = DriveTracker(spec, occupancy, seed, keep_steps)
+        return replace(network_stages(net, memory), track=track, refine=refine)
 
     @classmethod
     def fast(cls, net: SemanticGridNet, occupancy: CmcdotParams | None = None, **options: Any) -> "Stages":
@@ -269,6 +256,31 @@ class Stages:
         own = replace(self, track=copy.deepcopy(self.track), remember=copy.deepcopy(self.remember))
         parts = {name: checked(name, getattr(own, name), architecture) for name in self.given}
         return Stages(architecture=architecture, **parts)
+
+
+def network_stages(net: SemanticGridNet, memory: bool | MemoryParams) -> Stages:
+    """Return what `Stages.of` and `Stages.fast` share: the network's stages, and the memory; not `track` and `refine`.
+
+    Parameters
+    ----------
+    net, memory
+        Those of `Stages.of`.
+    """
+    architecture = net.need_architecture()
+
+    def fuse(p: Tensor, o: Tensor) -> Tensor:
+        return net.fuse(p, o).log_softmax(dim=1)
+
+    def fuse_at_returns(p: Tensor, o: Tensor, return_heights: Tensor) -> Tensor:
+        return net.fuse(p, o, return_heights=return_heights).log_softmax(dim=1)
+
+    return Stages(
+        segment=_on_arrays(net.segment),
+        sample=_on_arrays(net.sample),
+        fuse=_on_arrays(fuse_at_returns if architecture.uses_return_heights else fuse),
+        architecture=architecture,
+        remember=_memory(memory, architecture),
+    )
 
 
 def _on_arrays(function: Callable) -> Callable:

@@ -24,7 +24,7 @@ def all_free() -> Belief:
 
 def street(position: PlanarMotion, ahead_of: float = 10.0) -> tuple[np.ndarray, np.ndarray]:
     """A floor of 2 m tiles of three classes. The camera sees those that are more than some metres ahead."""
-    world = position.to_previous(SPEC.centers())
+    world = position.parent_from_child(SPEC.centers())
     tile = (np.floor(world[..., 0] / 2) + np.floor(world[..., 1] / 2)).astype(int) % S
     g = np.zeros((S + 4, *SPEC.shape), np.float32)
     g[:S] = np.where(np.arange(S)[:, None, None] == tile, 0.8, 0.1)
@@ -45,7 +45,7 @@ def test_tiles_that_the_camera_no_longer_sees_stay_sharp_and_in_place(step):
         remembered = class_memory.advance(g, all_free(), motion, 0.1)
         np.testing.assert_allclose(remembered.sum(axis=0), 1, atol=1e-5)
     near = slice(SPEC.shape[0] - 16, SPEC.shape[0] - 4), slice(5, 15)  # 2 to 8 m ahead, seen 5 to 20 frames ago
-    x, y = np.moveaxis(position.to_previous(SPEC.centers())[near], -1, 0)
+    x, y = np.moveaxis(position.parent_from_child(SPEC.centers())[near], -1, 0)
     inside = (np.abs(x / 2 - np.rint(x / 2)) > 0.26) & (np.abs(y / 2 - np.rint(y / 2)) > 0.26)  # over a cell from edges
     assert inside.sum() > 15
     right = remembered[:S].argmax(axis=0)[near][inside] == tile[near][inside]

@@ -131,7 +131,7 @@ def test_the_belief_follows_the_vehicle_through_a_turn():
         motion = PlanarMotion(0.33, 0.0, 0.013)
         belief = tracker.step(points, motion if pose is not STILL else STILL, 0.1)
         seen_from, pose = pose, pose.then(motion)
-    row, col, inside = SMALL.cells(seen_from.to_now(np.array([[19.5, 0.0]])))
+    row, col, inside = SMALL.cells(seen_from.child_from_parent(np.array([[19.5, 0.0]])))
     assert inside.all()
     assert belief.probability[State.STATIC, row[0], col[0]] > 0.9
 

@@ -1,9 +1,9 @@
 """The compiled twins equal the book's functions, over anything that a cell or a scan can hold.
 
 The compiled ones compute in single precision, which rounds probabilities by up to 6e-8. So they agree to 1e-6. Two
-formulas divide by as little as 1e-3 (`CERTAIN`), so that a rounded number counts a thousandfold: where an arrival meets
-a cell that is all but certainly STATIC, and where a thing that has all but certainly left was taken for a static one.
-So predictions and updates agree to 1e-4.
+formulas divide by as little as 1e-3 (`MAX_MOVE_PROBABILITY`), so that a rounded number counts a thousandfold: where an
+arrival meets a cell that is all but certainly STATIC, and where a thing that has all but certainly left was taken for a
+static one. So predictions and updates agree to 1e-4.
 """
 
 import copy

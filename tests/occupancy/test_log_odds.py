@@ -97,7 +97,7 @@ def test_the_grid_follows_the_vehicle_through_a_turn():
         points = scan_boxes([Box.around(20, 0, 1.5, 1.5, 2)], x=pose.dx, y=pose.dy, yaw=pose.dyaw)
         p = grid.step(points, PlanarMotion(0.33, 0.0, 0.01) if pose != PlanarMotion() else PlanarMotion(), 0.1)
         seen_from, pose = pose, pose.then(PlanarMotion(0.33, 0.0, 0.01))
-    row, col, inside = SPEC.cells(seen_from.to_now(np.array([[19.5, 0.0], [15.0, 0.0]])))
+    row, col, inside = SPEC.cells(seen_from.child_from_parent(np.array([[19.5, 0.0], [15.0, 0.0]])))
     assert inside.all()
     assert p.dtype == np.float32
     assert p[row, col][0] > 0.9

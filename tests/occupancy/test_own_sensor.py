@@ -31,7 +31,7 @@ class HitsOnly:
         return self
 
     def evidence(self, spec, pose):
-        rows, cols, inside = spec.cells(pose.to_previous(self.high[:, :2]))
+        rows, cols, inside = spec.cells(pose.parent_from_child(self.high[:, :2]))
         occupied, free = np.ones(spec.shape), np.ones(spec.shape)
         occupied[rows[inside], cols[inside]], free[rows[inside], cols[inside]] = 0.8, 0.05
         return Evidence(occupied, free)
@@ -93,7 +93,7 @@ def test_it_is_asked_in_the_frame_of_the_map_and_in_that_of_the_vehicle(kind):
     inner = (np.abs(block - [10.3, 0]) < [0.6, 2.3]).all(axis=1)
     for _ in range(8):
         pose = pose.then(motion)
-        seen = pose.to_now(block)
+        seen = pose.child_from_parent(block)
         p = occupied(kind, tracker.step(np.pad(seen, ((0, 0), (0, 1)), constant_values=1.0), motion, 0.1))
     rows, cols, inside = SPEC.cells(seen[inner])
     assert inside.all()

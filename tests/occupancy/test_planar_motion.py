@@ -28,8 +28,8 @@ def test_then_is_the_product_of_transforms(first, second):
 
 
 @given(motions, metres, metres)
-def test_to_now_undoes_to_previous(motion, x, y):
-    assert np.allclose(motion.to_now(motion.to_previous(np.array([[x, y]]))), [[x, y]], atol=1e-9)
+def test_child_from_parent_undoes_parent_from_child(motion, x, y):
+    assert np.allclose(motion.child_from_parent(motion.parent_from_child(np.array([[x, y]]))), [[x, y]], atol=1e-9)
 
 
 @given(motions, motions)

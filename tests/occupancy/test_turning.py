@@ -59,7 +59,7 @@ def test_nothing_moves_and_nothing_stands_where_nothing_is(name):
     for pose, belief in list(drive(tracker, boxes, start, motions))[WARM_UP:]:
         state = belief.probability.argmax(axis=0)
         moving.append(np.count_nonzero(state == State.DYNAMIC))
-        standing = pose.to_previous(SPEC.centers()[state == State.STATIC])
+        standing = pose.parent_from_child(SPEC.centers()[state == State.STATIC])
         assert len(standing) > 60
         assert not far_from_everything(standing, boxes).any()
     assert np.mean(moving) <= 2
@@ -73,9 +73,9 @@ def test_the_other_filters_keep_their_map_while_the_vehicle_turns():
     grid = LogOddsGrid(SPEC)
     both = SimpleNamespace(step=lambda *scan: (bof.step(*scan), grid.step(*scan)))
     for pose, (belief, p) in drive(both, boxes, start, motions):
-        standing = pose.to_previous(SPEC.centers()[belief.probability.argmax(axis=0) == State.STATIC])
+        standing = pose.parent_from_child(SPEC.centers()[belief.probability.argmax(axis=0) == State.STATIC])
         assert not far_from_everything(standing, boxes).any()
-        assert not far_from_everything(pose.to_previous(SPEC.centers()[p > 0.6]), boxes).any()
+        assert not far_from_everything(pose.parent_from_child(SPEC.centers()[p > 0.6]), boxes).any()
     assert np.count_nonzero(belief.probability.argmax(axis=0) == State.DYNAMIC) <= 2
 
 

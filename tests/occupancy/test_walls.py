@@ -25,7 +25,7 @@ from semgrid_edu.occupancy import (
     update,
 )
 from semgrid_edu.occupancy.bof import origins
-from semgrid_edu.occupancy.state import CERTAIN
+from semgrid_edu.occupancy.state import MAX_MOVE_PROBABILITY
 from semgrid_edu.workshop.simulation import simulate
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
@@ -212,7 +212,7 @@ def test_without_walls_prediction_is_the_papers_formula(seed):
 
     for row in range(16):
         came = [k for k in range(16) if k - jump[k] == row and jump[k]]
-        a = min(sum(weight[k] for k in came), CERTAIN)
+        a = min(sum(weight[k] for k in came), MAX_MOVE_PROBABILITY)
         free, static, _, unknown = own[row]
         stays, left = (0, weight[row]) if jump[row] else (weight[row], 0)
         moves = a * (1 - static) + (1 - a) * stays

@@ -85,7 +85,7 @@ def _poses(spec: GridSpec) -> tuple[list[Frame], NDArray, NDArray]:
     frames, places = sample_drive()[DRIVEN], []
     for frame in frames:
         motion = PlanarMotion.from_poses(frames[0].T_world_from_lidar, frame.T_world_from_lidar)
-        places.append((motion.to_previous(spec.centers().reshape(-1, 2)) // PATCH).astype(int).T + 30)
+        places.append((motion.parent_from_child(spec.centers().reshape(-1, 2)) // PATCH).astype(int).T + 30)
     bare = [replace(frame, image=None, labels=None, points=frame.points[:0]) for frame in frames]
     return bare, frames_since_seen(frames, spec), np.array(places)
 

@@ -6,7 +6,7 @@ The loops compute with plain numbers and select values without branching, so tha
 import numpy as np
 from numba import njit
 
-from semgrid_edu.occupancy.state import CERTAIN, State
+from semgrid_edu.occupancy.state import MAX_MOVE_PROBABILITY, State
 
 FREE, STATIC, DYNAMIC, UNKNOWN = (int(state) for state in State)
 
@@ -128,9 +128,9 @@ def collide(mixed, newborn, going, stays, arrives, doubtful):
     Returns
     -------
     probability : (4, H, W) float32
-        Let a = min(arrives, CERTAIN), b its doubtful part, s = P(STATIC), u = P(UNKNOWN) plus what has left, and d the
-        mass that is newborn or stays. P(DYNAMIC) is [a (1 - s) - b u + (1 - a) d] / (1 - a s - b u), and every other
-        state is (1 - a) P / (1 - a s - b u). What has left becomes FREE.
+        Let a = min(arrives, MAX_MOVE_PROBABILITY), b its doubtful part, s = P(STATIC), u = P(UNKNOWN) plus what has
+        left, and d the mass that is newborn or stays. P(DYNAMIC) is [a (1 - s) - b u + (1 - a) d] / (1 - a s - b u),
+        and every other state is (1 - a) P / (1 - a s - b u). What has left becomes FREE.
     newborn : (H, W) float32
         Scaled like everything else that was in the cell.
     factor : (2, H, W) float32
@@ -145,7 +145,7 @@ def collide(mixed, newborn, going, stays, arrives, doubtful):
     for r in range(newborn.shape[0]):
         for c in range(newborn.shape[1]):
             static = mixed[STATIC, r, c]
-            claim = min(arrives[r, c], CERTAIN)
+            claim = min(arrives[r, c], MAX_MOVE_PROBABILITY)
             vacated = going[r, c] - stays[r, c]
             unseen = mixed[UNKNOWN, r, c] + vacated
             share = claim / arrives[r, c] if arrives[r, c] > 0 else 0.0
@@ -218,14 +218,14 @@ def clear_wakes(probability, left, hidden):
     Returns
     -------
     (4, H, W) float32
-        In hidden cells, with a = min(left, CERTAIN) and s = P(STATIC): STATIC is (1 - a) s / (1 - a s), and FREE gets
-        what STATIC loses. All other cells are unchanged.
+        In hidden cells, with a = min(left, MAX_MOVE_PROBABILITY) and s = P(STATIC): STATIC is (1 - a) s / (1 - a s),
+        and FREE gets what STATIC loses. All other cells are unchanged.
     """
     cleared = probability.copy()
     for r in range(left.shape[0]):
         for c in range(left.shape[1]):
             static = probability[STATIC, r, c]
-            gone = min(left[r, c], CERTAIN) if hidden[r, c] else 0.0
+            gone = min(left[r, c], MAX_MOVE_PROBABILITY) if hidden[r, c] else 0.0
             cleared[STATIC, r, c] = (1 - gone) * static / (1 - gone * static)
             cleared[FREE, r, c] += static - cleared[STATIC, r, c]
     return cleared

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from semgrid_edu.fast.allocator import keep_step_memory
 from semgrid_edu.fast.occupancy.cells import look_up
+from semgrid_edu.fast.occupancy.cellwise import bayes
 from semgrid_edu.fast.occupancy.particles import cells_of
 from semgrid_edu.fast.occupancy.sensor import compiled_twin
-from semgrid_edu.fast.occupancy.steps import move, predict, resample, update
+from semgrid_edu.fast.occupancy.steps import initialise_unknown, move, predict, resample, update
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import cmcdot
@@ -107,15 +108,7 @@ def observe(
 class DriveTracker(cmcdot.DriveTracker):
     """The book's tracker with the compiled filter. Parameters are those of `DriveTracker`."""
 
-    def __init__(
-        self,
-        spec: GridSpec,
-        params: CmcdotParams | None = None,
-        seed: int | np.random.Generator = 0,
-        keep_steps: bool = False,
-    ) -> None:
-        super().__init__(spec)
-        self.filter = Cmcdot(spec, params, seed, keep_steps)
+    filter_class = Cmcdot
 
 
 def track_drive(
@@ -145,8 +138,8 @@ def local_belief(
 ) -> Belief:
     """Look up the map at the vehicle's cells and update them. Parameters are those of `local_belief`."""
     here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, pose)
-    prior = FilterState(here, Particles.none(), np.zeros(spec.shape, np.float32))
-    probability = update(prior, spec, in_grid, world).probability
+    prior, _ = initialise_unknown(here, in_grid.seen, world)
+    probability, _ = bayes(prior, in_grid.occupied, in_grid.free)
     mean, covariance = velocity
     moments = np.concatenate([mean, covariance.reshape(4, *map_spec.shape)])
     moments = look_up(moments, np.full(6, np.nan, np.float32), map_spec, spec, pose)

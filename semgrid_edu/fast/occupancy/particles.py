@@ -15,7 +15,7 @@ from semgrid_edu.fast.occupancy.cellwise import DYNAMIC, FREE, STATIC, largest_n
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.planar_motion import PlanarMotion
 from semgrid_edu.occupancy.state import OUTSIDE, Particles
-from semgrid_edu.occupancy.walls import SURE, Walls
+from semgrid_edu.occupancy.walls import WALL_EXPONENT, Walls
 
 SLOW = np.float32(16)
 """exp(-16) is negligible beside 1 in single precision, so smaller exponentials needn't be computed."""
@@ -189,7 +189,7 @@ def doubt_arrivals(
     times = -walls.clearing_time, -since, walls.clearing_time
     fewest = walls.clearing_cells * np.array([1, walls.second_look, 1])
     other_cells = (cells_at(particles, cells, spec, *path) for path in zip(times, fewest, strict=True))
-    wall = mixed[STATIC] ** SURE
+    wall = mixed[STATIC] ** WALL_EXPONENT
     fields = mixed[FREE], mixed[DYNAMIC], mixed[STATIC], wall, largest_nearby(wall), largest_nearby(mixed[STATIC])
     speeds = *map(float, car_velocity), float(least), float(walls.running_speed)
     return _doubt_arrivals(particles.velocity.ravel(), particles.weight, *other_cells, *fields, *speeds)
@@ -260,24 +260,20 @@ def _fly(position, velocity, noise, max_change, dt):
     return flown, faster
 
 
-def slow_down(particles: Particles, stop_rate: float, stop_speed: float, dt: float) -> Particles:
-    """Reduce each weight to the share that keeps moving. Parameters are those of `slow_down`."""
-    stops = np.float32(stop_rate * dt)
-    scale = np.float32(0.5 / stop_speed**2)
-    weight = _slow_down(particles.velocity, particles.weight, stops, scale)
-    return Particles(particles.position, particles.velocity, weight)
+def moving_share(velocity: NDArray, stop_rate: float, stop_speed: float, dt: float) -> NDArray[np.float32]:
+    """Return which share of its mass still moves after a time step. Parameters are those of `moving_share`."""
+    return _moving_share(velocity, np.float32(stop_rate * dt), np.float32(0.5 / stop_speed**2))
 
 
 @njit(cache=True, nogil=True)
-def _slow_down(velocity, weight, stops, scale):
-    kept = np.empty_like(weight)
-    for i in range(len(weight)):
+def _moving_share(velocity, stops, scale):
+    share = np.ones(len(velocity), np.float32)
+    for i in range(len(velocity)):
         speed2 = velocity[i, 0] * velocity[i, 0] + velocity[i, 1] * velocity[i, 1]
         slowness = speed2 * scale
-        kept[i] = weight[i]
         if slowness < SLOW:
-            kept[i] *= np.exp(-stops * np.exp(-slowness))
-    return kept
+            share[i] = np.exp(-stops * np.exp(-slowness))
+    return share
 
 
 def transform(particles: Particles, motion: PlanarMotion) -> Particles:

@@ -66,17 +66,14 @@ def scan_evidence(points: NDArray, spec: GridSpec, sensor: Sensor, pose: PlanarM
 def prepare_scan(points: NDArray, sensor: book.SensorModel) -> NDArray:
     """Prepare a scan for evidence. Parameters and result are those of `prepare_scan`; the type is that of `points`."""
     edge = edge_of_splits(points, sensor.edge)
-    points = without_own_returns(points, sensor.vehicle, edge, sensor.obstacle_min)
+    points = _without_own_returns(points, sensor.vehicle, edge, sensor.obstacle_min)
     if sensor.ground is not None:
         points[:, 2] = heights_of(points, sensor.ground)
     return points
 
 
 @njit(cache=True, nogil=True)
-def without_own_returns(
-    points: NDArray, vehicle: tuple[float, float, float, float], edge: float, low: float
-) -> NDArray:
-    """Remove the returns that come from the vehicle itself. Parameters are those of `without_own_returns`."""
+def _without_own_returns(points, vehicle, edge, low):
     x_min, x_max, y_min, y_max = vehicle
     others = np.empty((len(points), 3), points.dtype)
     n = 0

@@ -16,8 +16,8 @@ from semgrid_edu.fast.occupancy.particles import (
     cells_of,
     doubt_arrivals,
     fly,
+    moving_share,
     scale_in_cells,
-    slow_down,
     transform,
     weight_in_cells,
 )
@@ -67,8 +67,8 @@ def predict(
     check_shape("state", state.newborn, spec.shape)
     M = transition_matrix(world, dt)
     before = cells_of(state.particles.position, spec)
-    particles = slow_down(state.particles, world.stop_rate, world.stop_speed, dt)
-    particles = replace(particles, weight=particles.weight * np.float32(M[DYNAMIC, DYNAMIC]))
+    share = moving_share(state.particles.velocity, world.stop_rate, world.stop_speed, dt)
+    particles = replace(state.particles, weight=state.particles.weight * share * np.float32(M[DYNAMIC, DYNAMIC]))
     going = weight_in_cells(particles.weight, before, spec.shape)
     mixed, newborn = mix(state.probability, state.newborn, going, M)
 
@@ -89,25 +89,23 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     state = _single_precision(state)
     check_shape("state", state.newborn, spec.shape)
     check_shape("evidence", evidence.free, spec.shape)
-    seen = evidence.occupied != evidence.free
-    prior = initialise_unknown(state, seen, world)
-    posterior, factor = bayes(prior.probability, evidence.occupied, evidence.free)
-    cells = cells_of(prior.particles.position, spec)
-    weight = scale_in_cells(prior.particles.weight, cells, factor)
+    prior, born = initialise_unknown(state.probability, evidence.seen, world)
+    posterior, factor = bayes(prior, evidence.occupied, evidence.free)
+    cells = cells_of(state.particles.position, spec)
+    weight = scale_in_cells(state.particles.weight, cells, factor)
     walls = _walls_of(world)
-    origin = cells_at(prior.particles, cells, spec, -walls.clearing_time, walls.clearing_cells)
+    origin = cells_at(state.particles, cells, spec, -walls.clearing_time, walls.clearing_cells)
     left = weight_in_cells(weight, origin, spec.shape)
-    cleared = clear_wakes(posterior, left, ~seen)
-    newborn = (prior.newborn * factor).astype(np.float32)
-    return FilterState(cleared, replace(prior.particles, weight=weight), newborn)
+    cleared = clear_wakes(posterior, left, ~evidence.seen)
+    newborn = ((state.newborn + born) * factor).astype(np.float32)
+    return FilterState(cleared, replace(state.particles, weight=weight), newborn)
 
 
-def initialise_unknown(state: FilterState, seen: NDArray, world: WorldModel) -> FilterState:
+def initialise_unknown(probability: NDArray, seen: NDArray, world: WorldModel) -> tuple[NDArray, NDArray]:
     """Distribute the UNKNOWN mass of observed cells. Parameters are those of `initialise_unknown`."""
-    revealed = np.where(seen, state.probability[UNKNOWN], 0)
+    revealed = np.where(seen, probability[UNKNOWN], 0)
     shares = np.array([*world.first_sight, -1], dtype=revealed.dtype)
-    probability = state.probability + shares[:, None, None] * revealed
-    return FilterState(probability, state.particles, state.newborn + shares[DYNAMIC] * revealed)
+    return probability + shares[:, None, None] * revealed, shares[DYNAMIC] * revealed
 
 
 def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.random.Generator) -> FilterState:

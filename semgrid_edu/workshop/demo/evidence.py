@@ -146,7 +146,7 @@ def place_history(
     states = []
     for result in results:
         motion = PlanarMotion.from_poses(result.frame.T_world_from_lidar, now.T_world_from_lidar)
-        (row,), (col,), (inside,) = spec.cells(motion.to_previous(spec.centers()[cell])[None])
+        (row,), (col,), (inside,) = spec.cells(motion.parent_from_child(spec.centers()[cell])[None])
         states.append(result.belief.probability[:, row, col] if inside else NOTHING_KNOWN)
     return np.array([result.frame.time for result in results]), np.stack(states, axis=1)
 

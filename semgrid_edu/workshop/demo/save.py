@@ -100,7 +100,7 @@ def saved_drive(
     def take(result: FrameResult) -> None:
         number = np.int64(next(numbers))
         pose = PlanarMotion.from_poses(np.eye(4), result.frame.T_world_from_lidar)
-        reached.append(pose.to_previous(_corners(spec)))
+        reached.append(pose.parent_from_child(_corners(spec)))
         rows, cols = _around(np.concatenate(reached), spec.cell).shape
         if rows * cols > LARGEST:
             found = f"{rows} x {cols} at frame {number}"
@@ -186,7 +186,7 @@ def world_map(occupancy: NDArray, classes: NDArray, T_world_from_lidar: NDArray,
         The map, one pixel larger on each side than all grids together.
     """
     poses = [PlanarMotion.from_poses(np.eye(4), T) for T in T_world_from_lidar]
-    corners = np.array([pose.to_previous(_corners(spec)) for pose in poses])
+    corners = np.array([pose.parent_from_child(_corners(spec)) for pose in poses])
     world = _around(corners.reshape(-1, 2), spec.cell)
     height, width = world.shape
     x = world.x_max - (np.arange(height) + 0.5) * world.cell
@@ -197,7 +197,7 @@ def world_map(occupancy: NDArray, classes: NDArray, T_world_from_lidar: NDArray,
     for probability, labels, pose, its_corners in zip(occupancy, classes, poses, corners, strict=True):
         window = _window(world, its_corners)
         centers = np.stack(np.meshgrid(x[window[0]], y[window[1]], indexing="ij"), axis=-1)
-        rows, cols, inside = spec.cells(pose.to_now(centers).reshape(-1, 2))
+        rows, cols, inside = spec.cells(pose.child_from_parent(centers).reshape(-1, 2))
         state = np.where(inside, probability.argmax(axis=0)[rows, cols], State.UNKNOWN).reshape(pixels[window].shape)
         known = (state == State.FREE) | (state == State.STATIC)
         pixels[window][known] = np.where(state == State.FREE, FREE_PIXEL, OCCUPIED_PIXEL)[known]
