@@ -47,7 +47,7 @@ plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI
 
 # %%
 street = samples.real_drive()  # ten camera images and LIDAR scans in two seconds
-net = load_net(samples.real_weights(), street.camera)
+net = load_net(samples.segnet_real_weights(), street.camera)
 stages = Stages.fast(net).started()
 *earlier, frame = [street[k] for k in range(len(street))]
 beliefs = [stages.track.step(one) for one in earlier]

@@ -733,7 +733,7 @@ assert abs(P_map.max(axis=0).mean() - Q.max(axis=0).mean()) < 0.01
 
 # %% jupyter={"source_hidden": true}
 street = samples.real_drive()
-net = fast.load_net(samples.real_weights(), street.camera)
+net = fast.load_net(samples.segnet_real_weights(), street.camera)
 real_spec = net.architecture.grid
 pictures = list(run_pipeline(street[:10:2], net))
 labels = np.stack(

@@ -56,7 +56,7 @@ def with_memory(frames, weights):
     return list(run_pipeline(frames, replace(stages, refine=lambda log_g, o: np.exp(log_g))))
 
 
-street = with_memory([real[k] for k in range(9)], samples.real_weights())
+street = with_memory([real[k] for k in range(9)], samples.segnet_real_weights())
 driven = with_memory(sample[::2], samples.sample_weights())
 measured = json.loads(Path("../docs/results/memory.json").read_text())
 

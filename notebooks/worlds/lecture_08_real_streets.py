@@ -60,6 +60,8 @@ class WayToTrain(NamedTuple):
         Whether the image network starts from the installed ImageNet weights.
     with_simulated : bool
         Whether every other training step uses frames of simulated streets.
+    fill_gaps : bool
+        Whether cells far from any label are learned as unknown, see `TrainingSet.with_gaps_filled`.
     """
 
     architecture: Architecture
@@ -68,6 +70,7 @@ class WayToTrain(NamedTuple):
     params: TrainingParams | None = None
     imagenet: bool = False
     with_simulated: bool = False
+    fill_gaps: bool = False
 
 
 def _way(architecture: dict | None = None, training: dict | None = None, **fields) -> WayToTrain:
@@ -260,7 +263,10 @@ def _networks(
         folder = split.with_name(f"{split.name} {r}, {name}, {k}")
         if way.params and not (folder / WEIGHTS).exists():
             simulated = [streets[image_size_of(name)]] if way.with_simulated else []
-            mixture = Mixture([[_Subset(*part) for part in training], *simulated])
+            parts = [_Subset(*part) for part in training]
+            if way.fill_gaps:
+                parts = [part.with_gaps_filled() for part in parts]
+            mixture = Mixture([parts, *simulated])
             _train(way, starts, mixture, folder, k, fabric)
         files[folder.name] = folder / WEIGHTS if way.params else starts[0]
     return files

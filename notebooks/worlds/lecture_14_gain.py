@@ -20,7 +20,7 @@ from scipy.special import softmax
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
-from semgrid_edu.datasets.samples import real_weights, sample_drive, sample_weights
+from semgrid_edu.datasets.samples import sample_drive, sample_weights, segnet_real_weights
 from semgrid_edu.fast import load_net
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
@@ -141,7 +141,7 @@ def measure_memory(pandaset: str | Path, scene: str = "002", seed: int = 0, driv
         "fresh simulated streets": fresh,
         "sample drive": _scored([list(sample_drive())], sample_weights(), spec)[0],
         "real street, network from simulated streets": _scored(blocks, sample_weights(), spec)[0],
-        "real street, network that learned from its frames": _scored(blocks, real_weights(), spec)[0],
+        "real street, network that learned from its frames": _scored(blocks, segnet_real_weights(), spec)[0],
     }
     worth = _worth(views, spec)
     command = f"python -m worlds.lecture_14_gain PANDASET OUT --scene {scene} --seed {seed} --drives {drives}"

@@ -2,12 +2,16 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 
 from semgrid_edu.datasets.frames import LabelledDrive, visible_labels
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import FrameLabels
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, SYNTHIA_10, UNKNOWN_OF_STATE, LabelSet
+
+GAP = 1.0
+"""Half the side of a square around a cell, metres: without a label in it, nobody knows what the cell holds."""
 
 
 def grid_truth(labels: FrameLabels, belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
@@ -106,6 +110,40 @@ def fill_unlabelled(truth: NDArray[np.uint8], belief_probability: NDArray, label
     else:
         raise ArgumentError("labels", f"the label set {KITTI_14.name} or {SYNTHIA_10.name}", label_set.name)
     return np.where(truth == IGNORE, unknown, truth)
+
+
+def fill_gaps(truth: NDArray[np.uint8], belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
+    """Give an unknown class to unlabelled cells without a label nearby, up to `GAP` metres away.
+
+    Labels of real streets come from LIDAR returns. Behind a wall there are none, and a network that is never corrected
+    there calls these cells anything. Close to labels a return was only missed by chance, so these cells stay open.
+
+    Parameters
+    ----------
+    truth : (..., H, W) uint8
+        Classes of KITTI-14; 255 where unlabelled.
+    belief_probability : (..., 4, H, W) float
+        Probability of FREE, STATIC, DYNAMIC and UNKNOWN in each cell.
+    spec : GridSpec
+        The grid.
+
+    Returns
+    -------
+    (..., H, W) uint8
+        255 only in unlabelled cells close to labels.
+
+    Examples
+    --------
+    A road of one cell; beside it a cell of half a metre, and one three cells away that no beam has reached:
+
+    >>> belief = np.eye(4)[[0, 0, 3, 3, 3]].T.reshape(4, 1, 5)
+    >>> fill_gaps(np.array([[0, 255, 255, 255, 255]], np.uint8), belief, GridSpec.compact())
+    array([[  0, 255, 255,  13,  13]], dtype=uint8)
+    """
+    side = 2 * round(GAP / spec.cell) + 1
+    size = (1,) * (truth.ndim - 2) + (side, side)
+    near = maximum_filter(truth < KITTI_14.n_semantic, size=size)
+    return np.where((truth == IGNORE) & ~near, unknown_classes(belief_probability), truth)
 
 
 def unknown_classes(belief_probability: NDArray) -> NDArray[np.uint8]:

@@ -36,6 +36,11 @@ def real_drive() -> KittiRawDrive:
 
 def real_weights() -> Path:
     """Return the weights that real drives use by default; `card.json` beside them describes them."""
+    return samples_dir() / "efficientnet_real" / "weights.safetensors"
+
+
+def segnet_real_weights() -> Path:
+    """Return the weights of the paper's system that learned from the shipped street, for lectures 00, 10 and 14."""
     return samples_dir() / "segnet_real" / "weights.safetensors"
 
 

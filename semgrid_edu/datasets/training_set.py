@@ -1,5 +1,6 @@
 """The training set: image, occupancy grid and truth of each labelled frame of a split; excerpts of it (section 4.1)."""
 
+import copy
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,12 +14,14 @@ from torch.utils.data import Dataset
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.frames import LabelledDrive
+from semgrid_edu.datasets.grid_truth import fill_gaps
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame, load_index
 from semgrid_edu.datasets.label_policies import LidarTruth
 from semgrid_edu.datasets.training_arrays import ArrayRecipe
 from semgrid_edu.datasets.training_cache import cached_arrays
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import Architecture
 from semgrid_edu.occupancy import CmcdotParams, track_drive
 from semgrid_edu.storage.tensors import read_tensors
@@ -151,6 +154,21 @@ class TrainingSet(Dataset[Sample]):
             frames += [LabelledFrame(name, number) for number in numbers]
         parts = (replace(index, splits={split: tuple(frames)}) for _, frames in groups)
         return [cls(part, split, spec, image_size, truth=truth) for part in parts]
+
+    def with_gaps_filled(self) -> "TrainingSet":
+        """Return the same frames whose truth is unknown in cells far from any label, see `fill_gaps`.
+
+        Raises
+        ------
+        ArgumentError
+            When the classes aren't those of KITTI-14, which has unknown ones.
+        """
+        if self.label_set != KITTI_14:
+            raise ArgumentError("fill_gaps", f"the classes of {KITTI_14.name}", self.label_set.name)
+        other = copy.copy(self)
+        truth = fill_gaps(self.arrays["truth"], self.arrays["occupancy"], self.spec)
+        other.arrays = self.arrays | {"truth": truth}
+        return other
 
     def __len__(self) -> int:
         """Return the number of labelled frames."""

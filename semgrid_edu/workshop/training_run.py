@@ -101,7 +101,7 @@ def training_params(
         Whether the loss on the grid teaches the image network too.
     from_imagenet : bool
         Whether the image network starts from ImageNet weights. At the published size, training end to end then needs
-        no first stage. The compact network learns by AdamW in both, its encoder at three tenths of the rate.
+        no first stage. The compact network learns by AdamW in both, its encoder at a tenth of the rate.
     tint : float
         How far each colour varies, see `TrainingParams`.
 
@@ -112,7 +112,7 @@ def training_params(
     """
     params = TrainingParams(iterations, iterations, end_to_end=end_to_end, tint=tint)
     if preset == "compact":
-        from_weights = {"optimiser": "adamw", "learning_rate": 1e-3, "encoder_rate": 0.3}
+        from_weights = {"optimiser": "adamw", "learning_rate": 3e-3, "encoder_rate": 0.1}
         return replace(params, **from_weights) if from_imagenet else params
     image_iterations = 0 if from_imagenet and end_to_end else iterations
     return replace(params, image_iterations=image_iterations, learning_rate=1e-3, weight_limit=math.inf)
@@ -153,6 +153,7 @@ def train_network(
     half: bool = False,
     uses_return_heights: bool = False,
     image_size: tuple[int, int] | None = None,
+    fill_gaps: bool = False,
 ) -> None:
     """Train a network on the split "train" of data sets; under torchrun, in all of its processes.
 
@@ -186,6 +187,8 @@ def train_network(
         Whether the trained network's convolutions are written in 16 bits, see `save_net`.
     uses_return_heights, image_size
         As `architecture` takes them.
+    fill_gaps : bool
+        Whether cells far from any label are learned as unknown, see `TrainingSet.with_gaps_filled`.
 
     Raises
     ------
@@ -214,7 +217,7 @@ def train_network(
     keep_freed_memory()
     fabric = open_fabric(device)
     with fabric.rank_zero_first():  # the others find the arrays that it makes
-        dataset = _open(folders, description, truth)
+        dataset = _open(folders, description, truth, fill_gaps)
     description = replace(description, label_set=dataset.label_set.name)
     camera = dataset.camera
     net = _starts_as(starts, description, camera) if starts else build_net(description, camera, seed)
@@ -243,6 +246,7 @@ def train_network(
         if truth:
             details["truth"] = asdict(truth)
         command = _command(folders, folder, description, imagenet, starts, seed, params, truth)
+        command += " --fill-gaps" if fill_gaps else ""
         command += " --half" if half else ""
         write_provenance(folder, command, seed, ("torch", "numpy", "safetensors"), **details)
 
@@ -263,10 +267,15 @@ def _check_starts(
         raise ArgumentError("--from", f"at most {MOST_SEGMENTERS} image networks together", f"{len(starts)} files")
 
 
-def _open(folders: Sequence[str | Path], description: Architecture, truth: LidarTruth | None) -> TrainingSet | Mixture:
+def _open(
+    folders: Sequence[str | Path], description: Architecture, truth: LidarTruth | None, fill_gaps: bool
+) -> TrainingSet | Mixture:
     """Open the frames to learn from: those of one camera, or a mixture."""
     chosen = {"spec": description.grid, "image_size": description.image_size, "truth": truth}
-    mixture = Mixture([TrainingSet.by_camera(folder, "train", **chosen) for folder in folders])
+    data_sets = [TrainingSet.by_camera(folder, "train", **chosen) for folder in folders]
+    if fill_gaps:
+        data_sets = [[part.with_gaps_filled() for part in parts] for parts in data_sets]
+    mixture = Mixture(data_sets)
     return mixture.parts[0] if len(mixture.parts) == 1 else mixture
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from semgrid_edu.datasets import grid_truth
+from semgrid_edu.datasets.grid_truth import fill_gaps, unknown_classes
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import LABEL_GRID, FrameLabels
 from semgrid_edu.grid import GridSpec
@@ -52,6 +53,24 @@ def test_where_labels_have_gaps_unlabelled_cells_in_view_are_left_out_and_the_ot
     assert (truth[:20] == KITTI_14.index("road")).all()
     assert (truth[20:70] == IGNORE).all()
     np.testing.assert_array_equal(truth[70:], unknown[70:])
+
+
+@pytest.mark.parametrize("cell", [0.5, 1.0])
+def test_a_gap_becomes_unknown_exactly_where_no_label_is_within_a_metre(cell):
+    spec = GridSpec(0, 20, -10, 10, cell)
+    rng = np.random.default_rng(1)
+    truth = np.full((3, *spec.shape), IGNORE, np.uint8)
+    truth[rng.random(truth.shape) < 0.02] = KITTI_14.index("car")
+    truth[rng.random(truth.shape) < 0.02] = KITTI_14.index("unknown-free")  # not a label of anything
+    belief = np.eye(4)[rng.integers(0, 4, truth.shape)].transpose(0, 3, 1, 2)
+    filled = fill_gaps(truth, belief, spec)
+    unknown = unknown_classes(belief)
+    for k, row, col in np.argwhere(truth == IGNORE):
+        labelled = np.argwhere(truth[k] == KITTI_14.index("car"))
+        near = (np.abs(labelled - (row, col)).max(axis=1) * cell <= 1.0).any()
+        assert filled[k, row, col] == (IGNORE if near else unknown[k, row, col])
+    np.testing.assert_array_equal(filled[truth != IGNORE], truth[truth != IGNORE])
+    assert (filled == IGNORE).any()
 
 
 def test_one_seen_fine_cell_of_a_pole_names_its_cell(states):

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from semgrid_edu.crf import CrfParams
-from semgrid_edu.datasets.samples import real_weights, sample_weights
+from semgrid_edu.datasets.samples import sample_weights, segnet_real_weights
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.fast import build_net, load_net, mean_field, track_drive
 from semgrid_edu.frame import Frame
@@ -111,8 +111,8 @@ def test_a_set_can_be_used_for_several_drives(drive, net, results):
 
 
 def test_stages_of_networks_with_other_image_networks_can_be_mixed(drive, net, results):
-    """The shipped real network has three image networks: its stages take and give the same arrays."""
-    real = Stages.fast(load_net(real_weights(), drive.camera), FEW)
+    """The SegNets of the real street are three image networks: their stages take and give the same arrays."""
+    real = Stages.fast(load_net(segnet_real_weights(), drive.camera), FEW)
     mixed = replace(real, segment=None, sample=None).over(Stages.fast(net, FEW))
     result = next(run_pipeline(drive, mixed))
     np.testing.assert_array_equal(result.scores, results[0].scores)

@@ -36,7 +36,12 @@ class _Noise:
     def __init__(self, dataset_dir, split, spec, image_size, truth):
         assert split == "train"
         self.truth = truth
+        self.gaps_filled = False
         self.rng = torch.Generator().manual_seed(0)
+
+    def with_gaps_filled(self):
+        self.gaps_filled = True
+        return self
 
     def __len__(self):
         return 6
@@ -138,7 +143,7 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     write_text(data / "dataset.json", "{}")
     write_text(imagenet, "{}")
     options = ["--preset", "paper", "--imagenet", str(imagenet), "--seed", "2", "--iterations", "7", "--two-stage"]
-    options += ["--truth", truth, "--resume", "--return-heights", "--image-size", "192x640"]
+    options += ["--truth", truth, "--resume", "--return-heights", "--image-size", "192x640", "--fill-gaps"]
     result = CliRunner().invoke(app, ["train", "--data", str(data), "--out", str(out), *options, "--device", "cpu"])
     assert result.exit_code == 0, result.output
     usual = experiment.architecture("segnet", "paper")
@@ -146,11 +151,12 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
     assert given["imagenet"] == (_Net.segmenter, str(imagenet))
     net, dataset, folder, params, seed, resume, fabric = given["train"]
     assert dataset.truth == LidarTruth(POLICIES[truth], TruthFlaws())
+    assert dataset.gaps_filled
     assert (net, folder, seed, resume, fabric.device) == (_Net, out, 2, True, torch.device("cpu"))
     assert params == experiment.training_params("paper", 7, end_to_end=False, from_imagenet=True)
     provenance = json.loads((out / "provenance.json").read_text())
     written = "--segmenter segnet --preset paper --return-heights --image-size 192x640 --imagenet vgg16.safetensors"
-    written += f" --seed 2 --iterations 7 --two-stage --truth {truth}"
+    written += f" --seed 2 --iterations 7 --two-stage --truth {truth} --fill-gaps"
     assert provenance["command"] == f"semgrid-edu train --data minikitti --out out {written}"
     assert provenance["resumed"] is False  # there was nothing to resume
     assert provenance["truth"] == asdict(dataset.truth)

@@ -148,6 +148,7 @@ def train(
     tint: Annotated[float, typer.Option(help="How far each colour of an image varies: 0.15 is 15 % either way.")] = 0.0,
     two_stage: Annotated[bool, typer.Option("--two-stage", help="Train the fusion on a fixed image network.")] = False,
     truth: Annotated[str, typer.Option(help="true, lidar, or another way, such as no-cleanup.")] = "true",
+    gaps: Annotated[bool, typer.Option("--fill-gaps", help="Learn cells far from labels as unknown.")] = False,
     half: Annotated[bool, typer.Option("--half", help="Write convolutions in 16 bits, in half the space.")] = False,
     resume: Resume = False,
     device: Annotated[str, typer.Option(help="auto (a GPU if there is one), cpu, cuda or cuda:N.")] = "auto",
@@ -168,7 +169,7 @@ def train(
     tell([line for folder in data for line in dataset_doubts(folder, "train")])
     for path in start or ():
         tell(weights_doubts(path))
-    choices = kind | {"imagenet": imagenet, "device": device, "truth": chosen_truth(truth)}
+    choices = kind | {"imagenet": imagenet, "device": device, "truth": chosen_truth(truth), "fill_gaps": gaps}
     train_network(data, out, segmenter, params, seed, resume, start=start or (), half=half, **choices)
 
 
