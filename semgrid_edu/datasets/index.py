@@ -196,8 +196,8 @@ def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_
     ArgumentError
         When the scene isn't a plain name, there is no such camera, or none is left to train on.
     DataError
-        When there is no such scene, its returns have no labels, the folder is inside the scene, or there is a
-        dataset.json already.
+        When there is no such scene, its poses can't be read, its returns have no labels, the folder is inside the
+        scene, or there is a dataset.json already.
     """
     if Path(scene).name != scene:
         raise ArgumentError("scene", "the name of a folder such as 002", repr(scene))
@@ -210,6 +210,7 @@ def write_pandaset_index(folder: str | Path, root: str | Path, scene: str, test_
     there = [camera for camera in CAMERAS if (Path(root) / scene / "camera" / camera).is_dir()] or CAMERAS
     for camera in dict.fromkeys([*there, *test_cameras]):
         drive = PandasetScene(root, scene, camera)
+        drive.path()  # poses that can't be read are found now, not when a training begins
         entries = [{"scene": scene, "camera": camera, "frame": k} for k in range(len(drive))]
         splits["test" if camera in test_cameras else "train"] += entries
     if not semseg_folder(Path(root) / scene).is_dir():

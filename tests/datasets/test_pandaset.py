@@ -462,6 +462,14 @@ def test_a_scene_is_learnt_from_like_a_simulated_data_set(root, tmp_path):
     assert (truth[view] == IGNORE).any()
 
 
+def test_a_scene_whose_poses_cannot_be_read_is_refused_before_its_index_is_written(copy, tmp_path):
+    poses = copy / SCENE / "lidar" / "poses.json"
+    poses.write_text(poses.read_text().replace('"x": ', '"x": NaN, "was": ', 1))
+    with pytest.raises(DataError, match=r"poses.json: "):
+        write_pandaset_index(tmp_path / "data", copy, SCENE)
+    assert not (tmp_path / "data").exists()
+
+
 def test_what_cannot_be_a_data_set_is_refused(root, tmp_path):
     with pytest.raises(ArgumentError, match=r"camera: expected one of .*, found 'roof'"):
         write_pandaset_index(tmp_path, root, SCENE, ["roof"])
