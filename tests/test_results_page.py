@@ -41,6 +41,9 @@ def test_the_camera_beside_rules_without_one():
     assert per_cent(above["pixel accuracy above the height rule"]["mean"]) in page
     assert interval(above["class accuracy above the height rule"]) in page
     assert f"{per_cent(picked['network']['pixel accuracy']['mean'])} %" in page
+    refined = picked["network + CRF, unknown forbidden"]["pixel accuracy above the height rule"]
+    ends = interval(refined).partition(" ")[2]
+    assert f"which is {per_cent(refined['mean'])} above the rule {ends}" in page
     sure, unsure, rule, forest = (
         per_cent(later[name]["pixel accuracy"]["mean"])
         for name in ("network, unknown forbidden", "network", "height rule", "forest on heights and o")

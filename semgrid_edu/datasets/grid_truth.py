@@ -112,7 +112,7 @@ def fill_unlabelled(truth: NDArray[np.uint8], belief_probability: NDArray, label
     return np.where(truth == IGNORE, unknown, truth)
 
 
-def fill_gaps(truth: NDArray[np.uint8], belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
+def fill_gaps_with_unknown(truth: NDArray[np.uint8], belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
     """Give an unknown class to unlabelled cells without a label nearby, up to `GAP` metres away.
 
     Labels of real streets come from LIDAR returns. Behind a wall there are none, and a network that is never corrected
@@ -137,7 +137,7 @@ def fill_gaps(truth: NDArray[np.uint8], belief_probability: NDArray, spec: GridS
     A road of one cell; beside it a cell of half a metre, and one three cells away that no beam has reached:
 
     >>> belief = np.eye(4)[[0, 0, 3, 3, 3]].T.reshape(4, 1, 5)
-    >>> fill_gaps(np.array([[0, 255, 255, 255, 255]], np.uint8), belief, GridSpec.compact())
+    >>> fill_gaps_with_unknown(np.array([[0, 255, 255, 255, 255]], np.uint8), belief, GridSpec.compact())
     array([[  0, 255, 255,  13,  13]], dtype=uint8)
     """
     side = 2 * round(GAP / spec.cell) + 1

@@ -14,7 +14,7 @@ from torch.utils.data import Dataset
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.frames import LabelledDrive
-from semgrid_edu.datasets.grid_truth import fill_gaps
+from semgrid_edu.datasets.grid_truth import fill_gaps_with_unknown
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame, load_index
 from semgrid_edu.datasets.label_policies import LidarTruth
 from semgrid_edu.datasets.training_arrays import ArrayRecipe
@@ -156,7 +156,7 @@ class TrainingSet(Dataset[Sample]):
         return [cls(part, split, spec, image_size, truth=truth) for part in parts]
 
     def with_gaps_filled(self) -> "TrainingSet":
-        """Return the same frames whose truth is unknown in cells far from any label, see `fill_gaps`.
+        """Return the same frames whose truth is unknown in cells far from any label, see `fill_gaps_with_unknown`.
 
         Raises
         ------
@@ -166,7 +166,7 @@ class TrainingSet(Dataset[Sample]):
         if self.label_set != KITTI_14:
             raise ArgumentError("fill_gaps", f"the classes of {KITTI_14.name}", self.label_set.name)
         other = copy.copy(self)
-        truth = fill_gaps(self.arrays["truth"], self.arrays["occupancy"], self.spec)
+        truth = fill_gaps_with_unknown(self.arrays["truth"], self.arrays["occupancy"], self.spec)
         other.arrays = self.arrays | {"truth": truth}
         return other
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from semgrid_edu.datasets import grid_truth
-from semgrid_edu.datasets.grid_truth import fill_gaps, unknown_classes
+from semgrid_edu.datasets.grid_truth import fill_gaps_with_unknown, unknown_classes
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import LABEL_GRID, FrameLabels
 from semgrid_edu.grid import GridSpec
@@ -63,7 +63,7 @@ def test_a_gap_becomes_unknown_exactly_where_no_label_is_within_a_metre(cell):
     truth[rng.random(truth.shape) < 0.02] = KITTI_14.index("car")
     truth[rng.random(truth.shape) < 0.02] = KITTI_14.index("unknown-free")  # not a label of anything
     belief = np.eye(4)[rng.integers(0, 4, truth.shape)].transpose(0, 3, 1, 2)
-    filled = fill_gaps(truth, belief, spec)
+    filled = fill_gaps_with_unknown(truth, belief, spec)
     unknown = unknown_classes(belief)
     for k, row, col in np.argwhere(truth == IGNORE):
         labelled = np.argwhere(truth[k] == KITTI_14.index("car"))
