@@ -8,20 +8,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import test_house_rules as house_rules
 import torch
 from npz_drive import CAMERA, write_npz_drives
 from typer.testing import CliRunner
 
 from semgrid_edu.datasets import index, training_cache
 from semgrid_edu.datasets.samples import sample_drive
+from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.fast import track_drive
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import SEGMENTERS
-from semgrid_edu.occupancy import CmcdotParams, Evidence, State
+from semgrid_edu.occupancy import CmcdotParams, State
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.paper import ablations, reproduce
-from semgrid_edu.workshop.paper.variants import Variant
+from semgrid_edu.workshop.paper.variants import named_variants
 
 ROOT = Path(__file__).parents[1]
 TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -40,12 +42,7 @@ BLOCKS = [
 @pytest.fixture(scope="module")
 def written():
     """What the document's Python code defines, by name."""
-    names = {
-        "np": np,
-        "Evidence": Evidence,
-        "CmcdotParams": CmcdotParams,
-        "track_drive": track_drive,
-    }
+    names = {}
     for block in BLOCKS:
         if "npz_reader" not in block:  # that one is a script
             exec(block, names)
@@ -65,6 +62,12 @@ def test_the_sensor_model_makes_what_it_hits_occupied_and_leaves_the_rest_unknow
     expected = 0.8 * sum(prior) / (0.8 * sum(prior) + 0.05 * free)
     np.testing.assert_allclose(occupied[hit], expected, atol=1e-5)
     assert (belief.probability[State.UNKNOWN][~hit] > 0.99).all()
+
+
+def test_the_new_parts_run_alone_and_in_the_whole_system(written):
+    first = next(written["results"]).belief.probability
+    assert first.shape == written["belief"].probability.shape
+    np.testing.assert_allclose(first, written["belief"].probability, atol=0.02)
 
 
 def test_the_reader_makes_a_data_set_to_train_on_and_to_score(tmp_path, monkeypatch, capsys):
@@ -104,10 +107,21 @@ def plan_of(tmp_path, monkeypatch):
 
 def test_the_row_of_ablations_is_in_the_plan(plan_of, monkeypatch):
     (row,) = re.findall(r'`(".*?" = \{.*?\})`', TEXT)
-    assert "compact-3planes" not in plan_of("ablations")
-    added = {name: Variant(**fields) for name, fields in tomllib.loads(row).items()}
-    monkeypatch.setattr(ablations, "VARIANTS", ablations.VARIANTS | added)
-    assert "compact-3planes" in plan_of("ablations")
+    (options,) = re.findall(
+        r"^ +semgrid-edu reproduce (ablations .*) --plan --runs RUNS --out OUT$", TEXT, re.MULTILINE
+    )
+    (tag,) = re.findall(r"tag, here `(.*?)`", TEXT)
+    monkeypatch.setattr(ablations, "VARIANTS", {})
+    assert tag not in plan_of(*options.split())
+    monkeypatch.setattr(ablations, "VARIANTS", named_variants(tomllib.loads(row)))
+    assert f"compact{tag}" in plan_of(*options.split())
+
+
+@pytest.mark.parametrize("fields", [{}, {"n_planes": 5}])
+def test_a_variant_without_a_name_of_its_own_is_refused(fields):
+    """Such as one with a new field that `Variant.name` doesn't show: its runs would be another row's."""
+    with pytest.raises(ArgumentError, match=r"row 'new' of the ablations: expected .*Variant.name.*, found that of"):
+        named_variants({"5 planes": {"n_planes": 5}, "new": fields})
 
 
 def test_the_backbone_gets_a_row_of_table_1(written, plan_of, monkeypatch):
@@ -116,6 +130,21 @@ def test_the_backbone_gets_a_row_of_table_1(written, plan_of, monkeypatch):
     )
     monkeypatch.setitem(SEGMENTERS, "two-layers", written["TwoLayers"])
     assert "score two-layers compact with CRF" in plan_of("table1", *options.split())
+
+
+def test_the_backbone_is_documented_as_the_house_demands(monkeypatch):
+    (module,) = (block for block in BLOCKS if "class TwoLayers" in block)
+    monkeypatch.setitem(house_rules.SOURCES, "two_layers in CONTRIBUTING.md", module)
+    assert house_rules.undescribed("two_layers in CONTRIBUTING.md") == []
+
+
+def test_the_backbone_can_be_trained_by_the_command(monkeypatch, tmp_path):
+    """All that the command lacks is the data set."""
+    monkeypatch.chdir(tmp_path)
+    (command,) = re.findall(r"^ +semgrid-edu (train .*)$", TEXT, re.MULTILINE)
+    monkeypatch.setitem(SEGMENTERS, "two-layers", SEGMENTERS["segnet"])
+    with pytest.raises(DataError, match=r"minikitti.*dataset\.json"):
+        CliRunner().invoke(app, command.split(), catch_exceptions=False)
 
 
 def test_the_register_finds_the_equation():

@@ -55,6 +55,13 @@ def test_the_camera_beside_rules_without_one():
     assert f"by {interval(gains['class accuracy above the height rule'])} in class accuracy" in page
 
 
+def test_the_street_that_was_scored_once():
+    methods = json.loads((DOCS / "results" / "other_street.json").read_text(encoding="utf-8"))["methods"]
+    for name, *quoted in table("Another real street"):
+        found = methods[name.replace("shipped network", "network")]
+        assert quoted == [per_cent(found[metric]) for metric in ("pixel accuracy", "class accuracy")]
+
+
 def test_cars_on_their_tops():
     found = json.loads((DOCS / "results" / "overturned.json").read_text(encoding="utf-8"))
     top, wheels = (interval(found["called car"][way]) for way in ("on its top", "on its wheels"))

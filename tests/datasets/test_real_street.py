@@ -121,6 +121,14 @@ def test_it_can_be_scored(results):
     assert pixel_accuracy(confusion) > 0.6
 
 
+def test_the_shipped_network_invents_no_crowd(results):
+    """A network that learns nothing of cells far from labels calls more than 160 cells pedestrian; ten are."""
+    person = KITTI_14.index("pedestrian")
+    for result in results:
+        truth = grid_truth(result.frame.labels, result.belief.probability, SPEC)
+        assert (result.grid.argmax(axis=0) == person).sum() < 3 * (truth == person).sum()
+
+
 def test_the_filter_sees_the_oncoming_car_move_and_the_street_stand(results):
     dynamic = results[-1].belief.probability[State.DYNAMIC] > 0.5
     rows, cols = np.nonzero(dynamic)

@@ -20,8 +20,8 @@ from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
 from semgrid_edu.workshop.commands.experiments import check
+from semgrid_edu.workshop.paper import ablations, training_runs
 from semgrid_edu.workshop.paper import reproduce as reports
-from semgrid_edu.workshop.paper import training_runs
 from semgrid_edu.workshop.paper.data_runs import RECIPE_OF, DataRun
 from semgrid_edu.workshop.paper.experiments import EXPERIMENTS
 from semgrid_edu.workshop.paper.other_runs import FRAME, OVERTURNED, STEP, TIMES, UPRIGHT, OverturnedRun, TimeRun
@@ -30,6 +30,7 @@ from semgrid_edu.workshop.paper.run import ENDED, with_needs
 from semgrid_edu.workshop.paper.run_counts import RECORDS, RunCounts
 from semgrid_edu.workshop.paper.scales import SCALES, Scale
 from semgrid_edu.workshop.paper.score_runs import BASELINES, CONFUSIONS, WITH_CRF, BaselineRun, CountingRun
+from semgrid_edu.workshop.paper.variants import Variant
 from semgrid_edu.workshop.scoring.confusions import (
     DRIVES,
     FrameConfusions,
@@ -169,7 +170,10 @@ def without(arrays, word):
     [
         (lambda arrays: without(arrays, RECORDS), "expected counts that `semgrid-edu reproduce` has kept"),
         (lambda arrays: arrays | {RECORDS: np.array("[1]")}, "expected a JSON object"),
-        (lambda arrays: arrays | {RECORDS: np.array("{}")}, "expected the record of a run that has ended"),
+        (
+            lambda arrays: arrays | {RECORDS: np.array("{}")},
+            "expected the record of a run, data-tinytested .*those of 0",
+        ),
         (lambda arrays: without(arrays, "majority class, lidar"), "expected the array '.*majority class, lidar labels"),
         (
             lambda arrays: {key: array[:1] if array.ndim == 3 else array for key, array in arrays.items()},
@@ -280,6 +284,17 @@ def test_changed_counts_of_claims_are_named(first, last, said, computed, tmp_pat
     same, told = found(out)
     assert not same
     assert said in told
+
+
+def test_a_row_without_runs_is_listed(tmp_path, monkeypatch):
+    """A row was added to the ablations after their counts were kept; the other rows are computed again."""
+    added = {"3 planes": Variant(n_planes=3), "4 planes": Variant(n_planes=4)}
+    monkeypatch.setattr(ablations, "VARIANTS", ablations.VARIANTS | added)
+    for file in reports.result_files(COMMITTED / "reduced", "ablations")[:4]:
+        shutil.copy(file, tmp_path)
+    same, said = found(tmp_path)
+    assert same, said
+    assert said.endswith("no runs yet (`semgrid-edu reproduce ablations` makes them): 3 planes, 4 planes")
 
 
 @pytest.mark.parametrize(("scale", "name"), [*(("reduced", name) for name in EXPERIMENTS), ("long", "table1")])

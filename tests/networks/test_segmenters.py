@@ -129,7 +129,8 @@ def test_unknown_presets_and_class_numbers_are_refused(name):
         build_segmenter(name, 0)
 
 
-def test_compact_networks_cost_alike(name):
+@pytest.mark.parametrize("name", ["segnet", "fcn", "deeplab", "unet", "efficientnet"])
+def test_the_compact_networks_that_are_compared_cost_alike(name):
     """What is compared is the architecture, not the effort: weights, and arithmetic of a forward pass.
 
     EfficientNet has its published weights, and so six times as many.
