@@ -354,7 +354,7 @@ class TestPanels:
         record.views.append(view)
         record._occurs[0] = True
         record._seconds[""] = [[0.1] * 5]
-        html = page_html(record, "<i>&", self.CAMERA, (96, 320), {})
+        html = page_html(record, "<i>&", self.CAMERA, (96, 320), {"uses_return_heights": False})
         page = Page(html)
         assert "<i>&" not in html
         assert "<u>" not in html

@@ -56,7 +56,7 @@ def test_it_learns_in_both_stages(tiny, tmp_path):
 
 
 def test_the_command_line_names_it(tiny):
-    shown = CliRunner().invoke(app, ["train", "--help"], env={"COLUMNS": "200"}).output
+    shown = "".join(CliRunner().invoke(app, ["train", "--help"]).output.split())  # lines may break at a hyphen
     assert all(name in shown for name in SEGMENTERS)
     assert "two-layers" in shown
 

@@ -29,6 +29,12 @@ REMEMBERED = (
 )
 """Added to the table of metrics if a map with memory is scored."""
 
+HEIGHTS_TEXT = " This network looks at a cell only at the heights of its lowest and highest return, which it knows."
+HEIGHTS_WIRE = """\
+<g class="wires"><path d="M131 55H150V94H594"/></g><g class="how"><text x="370" y="86">heights of returns</text></g>
+"""
+"""What the page adds to its data flow for a network with `uses_return_heights`."""
+
 LEARNED = " on frames from which it has learned"
 """Added to the heading of the metrics if they aren't those of new frames."""
 
@@ -143,6 +149,8 @@ def page_html(
         far=f"{far:g}",
         ramp=",".join(f"rgb{tuple(colour)}" for colour in depth_colours(np.geomspace(near, far, 9)).tolist()),
         network_size="{1} × {0} pixels".format(*network_size),
+        heights_text=HEIGHTS_TEXT if story["uses_return_heights"] else "",
+        heights_wire=HEIGHTS_WIRE if story["uses_return_heights"] else "",
         your_scores=_your_scores(first, camera, comparison),
         grids="\n".join(_single_or_pair(panel, record, camera) for panel in shown),
         states=_swatches(zip(STATE_NAMES, STATE_COLOURS, strict=True)),

@@ -17,13 +17,13 @@ from semgrid_edu.workshop.paper.scales import Scale, table1_runs
 from semgrid_edu.workshop.paper.score_runs import WITH_CRF, WITH_SEARCHED, ScoreRun, by_seed
 from semgrid_edu.workshop.paper.tables import CELLS, beside_usual, beside_usual_table
 from semgrid_edu.workshop.paper.truth_costs import learned_from
-from semgrid_edu.workshop.paper.variants import CalibrationError, Variant
+from semgrid_edu.workshop.paper.variants import CalibrationError, named_variants
 from semgrid_edu.workshop.scoring.confusions import distance_band_names
 from semgrid_edu.workshop.scoring.grids import NETWORK
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, on_cells, score_with_interval, shown
 
 _TABLES = table_beside(__file__)
-VARIANTS = {name: Variant(**fields) for name, fields in _TABLES["variants"].items()}
+VARIANTS = named_variants(_TABLES["variants"])
 """Each differs in one thing from the usual network."""
 
 CALIBRATION_ERRORS = [CalibrationError(**{kind: size}) for kind, sizes in _TABLES["errors"].items() for size in sizes]
@@ -84,8 +84,14 @@ def ablation_runs(scale: Scale, seeds: int) -> list[Run]:
     return [*usual, *chain(*chain(*pairs))]
 
 
+def rows_without_runs(scale: Scale, seeds: int, counted: RunCounts) -> list[str]:
+    """Return which rows were added after the counts were kept. Parameters are those of `ablations`."""
+    rows = (row for section in ablated_runs(scale, seeds).values() for row in section.items())
+    return [what for what, (runs, _) in rows if not all(map(counted.knows, runs))]
+
+
 def ablations(scale: Scale, seeds: int, counted: RunCounts) -> dict:
-    """Return all ablations, from runs that have ended.
+    """Return all ablations, from runs that have ended, without `rows_without_runs`.
 
     Parameters
     ----------
@@ -103,8 +109,9 @@ def ablations(scale: Scale, seeds: int, counted: RunCounts) -> dict:
         and its scores.
     """
     usual = table1_runs(scale, seeds)["segnet"]
+    later = rows_without_runs(scale, seeds, counted)
     found: dict[str, list[dict]] = {
-        name: [{"what": what, **beside_usual(*pair, counted)} for what, pair in rows.items()]
+        name: [{"what": what, **beside_usual(*pair, counted)} for what, pair in rows.items() if what not in later]
         for name, rows in ablated_runs(scale, seeds).items()
     }
     found["distance"] = [_band(band, usual, counted) for band in distance_band_names()]

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from semgrid_edu.storage.files import table_beside
 from semgrid_edu.workshop.paper import figures, scales, tables, verdicts
-from semgrid_edu.workshop.paper.ablations import ablation_runs, ablations, ablations_markdown
+from semgrid_edu.workshop.paper.ablations import ablation_runs, ablations, ablations_markdown, rows_without_runs
 from semgrid_edu.workshop.paper.data_runs import RECIPE_OF, frame_counts
 from semgrid_edu.workshop.paper.published import TABLE_1_SCORES, TABLE_2_SCORES
 from semgrid_edu.workshop.paper.run import Run
@@ -32,6 +32,9 @@ class Experiment:
         result -> Markdown.
     picture : callable, optional
         (result, what is known about the runs) -> Figure, for what only a picture can show.
+    rows_without_runs : callable, optional
+        As `result`, -> the rows that the result leaves out, because they were added after the counts were kept. Without
+        it every run is needed.
     title : str
         What it is called.
     field : str
@@ -48,6 +51,7 @@ class Experiment:
     result: Callable[[Scale, int, RunCounts], dict]
     markdown: Callable[[dict], str]
     picture: Callable[[dict, RunCounts], Figure] | None = None
+    rows_without_runs: Callable[[Scale, int, RunCounts], list[str]] | None = None
     title: str = ""
     field: str = "kitti"
     seeds: str = "seeds"
@@ -75,7 +79,7 @@ _DIFFERENCES = table_beside(__file__, "deviations")
 _ACCURACY = {"table1": (scales.table1_runs, TABLE_1_SCORES), "table2": (scales.table2_runs, TABLE_2_SCORES)}
 _OTHERS = {
     "claims": (verdicts.claims_plan, verdicts.judge_claims, verdicts.claims_markdown),
-    "ablations": (ablation_runs, ablations, ablations_markdown),
+    "ablations": (ablation_runs, ablations, ablations_markdown, None, rows_without_runs),
     "truth-costs": (truth_cost_runs, truth_costs, truth_costs_markdown),
     "figures": (figures.figure_runs, figures.shown_frames, figures.figures_markdown, figures.figures_picture),
 }

@@ -16,7 +16,7 @@ from semgrid_edu.storage.reading import read_bytes, read_json
 from semgrid_edu.workshop.paper.experiments import EXPERIMENTS
 from semgrid_edu.workshop.paper.reproduce import computed_result, result_files, result_markdown, times_of
 from semgrid_edu.workshop.paper.run_counts import RunCounts
-from semgrid_edu.workshop.paper.scales import scale_named
+from semgrid_edu.workshop.paper.scales import Scale, scale_named
 
 NOT_COMPARED = "versions"
 """The part of a result with the versions of the libraries."""
@@ -53,6 +53,8 @@ def check_results(folder: Path, echo: Callable[[str], None]) -> bool:
     for name, lines in differing.items():
         counts = result_files(folder, name)[3].name
         found = f"differs in {len(lines)} place{'s' * (len(lines) > 1)}" if lines else "as written"
+        if later := _rows_without_runs(folder, name):
+            found += f"; no runs yet (`semgrid-edu reproduce {name}` makes them): {', '.join(later)}"
         echo("\n".join([f"{name}, computed again from {counts}: {found}", *lines]))
     return not any(differing.values())
 
@@ -67,20 +69,33 @@ def differences_in(folder: Path, name: str) -> Iterator[str]:
     name : str
         A key of `EXPERIMENTS`.
     """
-    scores, words, times, counts, _ = result_files(folder, name)
-    written = read_json(scores)
-    counted = RunCounts(counts)
+    scores, words, times, *_ = result_files(folder, name)
     experiment = EXPERIMENTS[name]
-    size = written.get("scale"), written.get("seeds")
-    if not isinstance(size[0], str) or type(size[1]) is not int or not 1 <= size[1] <= MOST_SEEDS:
-        raise DataError(scores, "a result of `semgrid-edu reproduce` with its scale and seeds", f"{size}")
-    result = computed_result(name, experiment, scale_named(size[0]), size[1], counted)
+    written, scale, seeds, counted = _read(folder, name)
+    result = computed_result(name, experiment, scale, seeds, counted)
     yield from differences(written, json.loads(json.dumps(result)), scores.name)  # as it comes back from its file
     yield from differences(read_json(times), times_of(counted.records), times.name)
     lines = [read_bytes(words).decode(errors="replace").splitlines(), result_markdown(result, experiment).splitlines()]
     for number, (ours, computed) in enumerate(zip_longest(*lines), start=1):
         if ours != computed:
             yield f"{words.name}, line {number}"
+
+
+def _read(folder: Path, name: str) -> tuple[dict, Scale, int, RunCounts]:
+    """Return what is written about an experiment, its scale, its number of seeds and its counts."""
+    scores, _, _, counts, _ = result_files(folder, name)
+    written = read_json(scores)
+    counted = RunCounts(counts)
+    size = written.get("scale"), written.get("seeds")
+    if not isinstance(size[0], str) or type(size[1]) is not int or not 1 <= size[1] <= MOST_SEEDS:
+        raise DataError(scores, "a result of `semgrid-edu reproduce` with its scale and seeds", f"{size}")
+    return written, scale_named(size[0]), size[1], counted
+
+
+def _rows_without_runs(folder: Path, name: str) -> list[str]:
+    """Return the rows that were added after an experiment's counts were kept."""
+    found = EXPERIMENTS[name].rows_without_runs
+    return found(*_read(folder, name)[1:]) if found else []
 
 
 def differences(written: object, computed: object, place: str) -> Iterator[str]:

@@ -198,7 +198,10 @@ def computed_result(name: str, experiment: Experiment, scale: Scale, seeds: int,
     counted : RunCounts
         What is known about the runs: from their folders, or from what was kept of them.
     """
-    records = {run: counted.record(run) for run in with_needs(experiment.runs(scale, seeds))}
+    needed = with_needs(experiment.runs(scale, seeds))
+    if experiment.rows_without_runs:
+        needed = [run for run in needed if counted.knows(run)]
+    records = {run: counted.record(run) for run in needed}
     options, beside_gpu = _how_trained(records)
     command = f"semgrid-edu reproduce {name} --scale {scale.name} --seeds {seeds} --runs RUNS --out OUT"
     about = {

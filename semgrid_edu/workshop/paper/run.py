@@ -123,7 +123,7 @@ def checked_record(path: str | Path, record: object) -> dict:
     try:
         checked = record | {"seconds": float(record["seconds"]), "date": str(record.get("date", "unknown"))}
     except (ValueError, KeyError, TypeError, OverflowError, AttributeError) as error:
-        raise DataError(path, "the record of a run that has ended", error) from error
+        raise DataError(path, "the record of a run that has ended", repr(record)[:100]) from error
     if not 0 <= checked["seconds"] < math.inf:
         raise DataError(path, "the record of a run that has ended", f"{checked['seconds']} seconds")
     return checked

@@ -98,6 +98,16 @@ class RunCounts:
         found = checked_confusions(self.source, self.of(run, (DRIVES, name), by_drive))
         return FrameConfusions(found.drives, {method: found.counts[name]})
 
+    def knows(self, run: Run) -> bool:
+        """Return whether a run was among those whose counts were kept; all runs of a folder are expected to end.
+
+        Parameters
+        ----------
+        run : Run
+            The run.
+        """
+        return self.source.is_dir() or run.name in self.records
+
     def record(self, run: Run) -> dict:
         """Return what a run recorded when it ended, as `Run.record` does.
 
@@ -113,7 +123,10 @@ class RunCounts:
         """
         if self.source.is_dir():
             self.records[run.name] = run.record(self.source)
-        return checked_record(self.source, self.records.get(run.name))
+        if run.name not in self.records:
+            expected = f"the record of a run, {run.name} (`semgrid-edu reproduce` makes it)"
+            raise DataError(self.source, expected, f"those of {len(self.records)} others")
+        return checked_record(self.source, self.records[run.name])
 
     def keep(self, path: str | Path) -> None:
         """Write all that has been read to one file, atomically: whole numbers in as few bytes as they need.

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import Camera, rigid_transform
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import Architecture
 from semgrid_edu.planes import plane_heights
 
@@ -107,3 +108,28 @@ class Variant:
 
 USUAL = Variant()
 """The network of the paper."""
+
+
+def named_variants(rows: dict[str, dict]) -> dict[str, Variant]:
+    """Return the variants of a table, by what its rows are called.
+
+    Runs of variants with equal names would share a folder, so each needs a name of its own.
+
+    Parameters
+    ----------
+    rows : dict of str to dict
+        Of each row the fields of `Variant` that differ from the usual network's.
+
+    Raises
+    ------
+    ArgumentError
+        When a variant has the name of the usual network, or of another row.
+    """
+    variants = {what: Variant(**fields) for what, fields in rows.items()}
+    owners = {USUAL.name: "the usual network"}
+    for what, variant in variants.items():
+        if variant.name in owners:
+            expected = "a variant with a `Variant.name` of its own"
+            raise ArgumentError(f"row {what!r} of the ablations", expected, f"that of {owners[variant.name]}")
+        owners[variant.name] = f"row {what!r}"
+    return variants
