@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 
 DOCS = Path(__file__).parents[1] / "docs"
+METRICS = ("pixel accuracy", "class accuracy")
+FORBIDDEN = ", unknown forbidden"
 
 
 def table(heading):
@@ -59,7 +61,11 @@ def test_the_street_that_was_scored_once():
     methods = json.loads((DOCS / "results" / "other_street.json").read_text(encoding="utf-8"))["methods"]
     for name, *quoted in table("Another real street"):
         found = methods[name.replace("shipped network", "network")]
-        assert quoted == [per_cent(found[metric]) for metric in ("pixel accuracy", "class accuracy")]
+        assert quoted == [per_cent(found[metric]) for metric in METRICS]
+    page = (DOCS / "results.md").read_text(encoding="utf-8")
+    segnets = json.loads((DOCS / "results" / "other_street_segnet.json").read_text(encoding="utf-8"))["methods"]
+    free, bound = ([per_cent(segnets[way][metric]) for metric in METRICS] for way in ("network", f"network{FORBIDDEN}"))
+    assert f"{free[0]} % and a class accuracy of {free[1]}, or {bound[0]} and {bound[1]} with unknown forbidden" in page
 
 
 def test_cars_on_their_tops():
