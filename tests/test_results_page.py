@@ -68,6 +68,19 @@ def test_the_street_that_was_scored_once():
     assert f"{free[0]} % and a class accuracy of {free[1]}, or {bound[0]} and {bound[1]} with unknown forbidden" in page
 
 
+def test_the_crowd_that_is_not_there():
+    counts = json.loads((DOCS / "results" / "crowd.json").read_text(encoding="utf-8"))
+    page = (DOCS / "results.md").read_text(encoding="utf-8")
+    called = {name: counts[name]["called"] for name in list(counts)[:3]}
+    shipped, without, segnets = (f"{min(cells)} to {max(cells)} cells" for cells in called.values())
+    assert f"it calls {shipped} of each *pedestrian*" in page
+    assert f"a map that calls {without} *pedestrian*" in page
+    assert f"calls {segnets} *pedestrian*" in page
+    found = counts["shipped network"]
+    assert f"the {min(found['labelled'])} to {max(found['labelled'])} cells that are labelled so" in page
+    assert (min(found["right"]), max(found["right"])) == (1, 4)  # "one to four"
+
+
 def test_cars_on_their_tops():
     found = json.loads((DOCS / "results" / "overturned.json").read_text(encoding="utf-8"))
     top, wheels = (interval(found["called car"][way]) for way in ("on its top", "on its wheels"))
