@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def samples_dir() -> Path:
-    """Return the folder of the samples. A wheel has only the drive and SegNet, a clone has all samples."""
+    """Return the folder of the samples. A wheel has the drives and the networks of the demo, a clone all samples."""
     return shipped_folder("data_samples")
 
 

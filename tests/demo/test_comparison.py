@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.grid_truth import grid_truth
-from semgrid_edu.datasets.samples import sample_drive, sample_weights
+from semgrid_edu.datasets.samples import real_drive, sample_drive, sample_weights
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
@@ -102,6 +102,23 @@ class TestExample:
         np.testing.assert_array_equal(package.scores, yours.scores)
         assert (package.grid != yours.grid).any()
         assert (yours.belief.probability[State.DYNAMIC] < 0.5).all()  # one scan doesn't tell what moves
+
+
+SAMPLE = """
+import numpy as np
+
+def sample(s):
+    assert s.shape == (14, 96, 320)
+    return np.zeros((14, 20, 142, 62), np.float32)
+"""
+REFINE = "import numpy as np\n\ndef refine(log_g, o):\n    return np.exp(log_g)\n"
+
+
+@pytest.mark.parametrize(("code", "size"), [(SAMPLE, "320 × 96"), (REFINE, "480 × 144")], ids=["sample", "refine"])
+def test_a_stage_of_the_papers_system_gets_that_system_on_a_real_drive(tmp_path, code, size):
+    (tmp_path / "my_stages.py").write_text(code)
+    page = write_demo(real_drive(), None, tmp_path / "out", tmp_path / "my_stages.py", frames="0:1")
+    assert f"sees the image at {size} pixels" in page.read_text(encoding="utf-8")
 
 
 def test_the_page_shows_the_packages_picture_and_yours_side_by_side(page, frames, results):

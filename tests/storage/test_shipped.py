@@ -11,7 +11,7 @@ from semgrid_edu.storage import files as shipped
 from semgrid_edu.storage.files import shipped_folder
 
 CLONE = shipped.PACKAGE.parent
-LARGEST = 30_000_000
+LARGEST = 32_000_000
 """Bytes that a wheel may have."""
 
 

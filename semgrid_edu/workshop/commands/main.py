@@ -90,7 +90,6 @@ def demo(
     Without --frames all frames are run. A file for --stages defines some of track, segment, sample, fuse, refine and
     remember.
     """
-    from semgrid_edu.datasets.samples import real_weights
     from semgrid_edu.networks.weights import weights_doubts
     from semgrid_edu.workshop.demo import write_both_streets, write_demo
     from semgrid_edu.workshop.doubts import drive_doubts
@@ -109,7 +108,7 @@ def demo(
     if chosen is None:
         page = write_both_streets(out, weights, **options)
     else:
-        page = write_demo(chosen, weights or real_weights(), out, **options)
+        page = write_demo(chosen, weights, out, **options)
     typer.echo(f"open {page.resolve().as_uri()}\nin one picture: {page.parent / 'overview.png'}")
     for written in filter(None, (save, rerun)):
         typer.echo(f"written to {written}")

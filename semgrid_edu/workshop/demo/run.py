@@ -12,7 +12,7 @@ from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.drive_files import first_sound, sound_frames
 from semgrid_edu.datasets.frames import FrameSequence
-from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights
+from semgrid_edu.datasets.samples import real_drive, real_weights, sample_drive, sample_weights, segnet_real_weights
 from semgrid_edu.errors import ArgumentError, DataError, needed
 from semgrid_edu.fast import load_net
 from semgrid_edu.frame import Frame
@@ -113,13 +113,16 @@ POOR = (
 )
 """What to expect on a drive without labels, with weights that have no card."""
 
+PAPERS_ALONE = {"segment", "sample", "fuse"}
+"""Stages that a network with return heights runs in another way than the paper: on larger images, probabilities, l."""
+
 STORIES = 200_000
 """How many cells have a story at most, in all frames together: a story takes about 55 bytes of the page."""
 
 
 def write_demo(
     drive: FrameSequence,
-    weights: str | Path,
+    weights: str | Path | None,
     out: str | Path,
     stages: str | Path | None = None,
     frames: str | None = None,
@@ -136,8 +139,9 @@ def write_demo(
     ----------
     drive : FrameSequence
         The drive, with its `camera`; it has to have camera images.
-    weights : path-like
-        The network's weights, as `save_net` wrote them.
+    weights : path-like, or None
+        The network's weights, as `save_net` wrote them. None for the shipped network for real drives: `real_weights()`,
+        or `segnet_real_weights()` for a student's `segment`, `sample` or `fuse`, which are made for the paper's system.
     out : path-like
         The folder to write index.html and overview.png to; made when missing.
     stages : path-like, optional
@@ -175,6 +179,8 @@ def write_demo(
         When a stage of the file raises an error, or returns what the next one can't use.
     """
     chosen = ChosenFrames.of(len(drive), frames)
+    mine = load_stages(stages) if stages is not None else Stages()
+    weights = weights or (segnet_real_weights() if PAPERS_ALONE & set(mine.given) else real_weights())
     net = load_net(weights, drive.camera)
     card = _card_beside(weights)
     known = card.get("other_streets", "")
@@ -183,7 +189,6 @@ def write_demo(
     first = first_sound(drive.__getitem__, chosen.run if skipped else chosen.run[:1])
     if first.image is None:
         raise DataError(drive.folder, f"images of {getattr(drive, 'view', 'its camera')}", "none")
-    mine = load_stages(stages) if stages is not None else Stages()
     memory = memory or mine.remember is not None
     runs = [Stages.fast(net, keep_steps=True, memory=memory)]
     comparison = None
@@ -257,7 +262,7 @@ def write_both_streets(out: str | Path, weights: str | Path | None = None, **opt
     _check_page(out, options.get("force"))  # all of them before the first page is made
     _check_page(second, options.get("force"))
     _check_handed_out(second, None, others["rerun"], options.get("force"))
-    page = write_demo(real_drive(), weights or real_weights(), out, switch=REAL, **options)
+    page = write_demo(real_drive(), weights, out, switch=REAL, **options)
     write_demo(sample_drive(), weights or sample_weights(), second, switch=SIMULATED, **options | others)
     return page
 
