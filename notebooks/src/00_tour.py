@@ -564,7 +564,7 @@ assert 74 < scores_of(silent)[0] < 77
 # would you rather drive?
 #
 # A network can also learn to be silent. `semgrid-edu demo` takes another one for real streets. Its image network started
-# from the photographs of ImageNet, and in training every cell more than a metre from any label was called *unknown*:
+# from the photographs of ImageNet, and in training each cell with no label around it was called *unknown*:
 
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 taught = Stages.fast(load_net(samples.real_weights(), street.camera))
@@ -579,8 +579,8 @@ assert 1 <= found <= 5
 assert 82 < scores_of(called)[0] < 88
 
 # %% [markdown]
-# No crowd, but it finds only three of the ten true cells. Is it this word that makes it silent? Switch it off: trained in the
-# same way, but with these cells left out, it calls [838 cells](../docs/results/crowd.json) of this frame *pedestrian*.
+# No crowd, but it finds only three of the ten true cells. Did the label *unknown* do this? Switch it off: trained once
+# more without it, the network calls [838 cells](../docs/results/crowd.json) of this frame *pedestrian*, and finds seven.
 #
 # ## The story of one cell
 #

@@ -5,13 +5,16 @@ A network that nothing corrects far from labels may call these cells anything, a
 
 from pathlib import Path
 
+import numpy as np
 import typer
+from numpy.typing import NDArray
 
 from semgrid_edu.datasets import grid_truth
 from semgrid_edu.datasets.samples import real_drive, real_weights, segnet_real_weights
 from semgrid_edu.fast import load_net
+from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.pipeline import run_pipeline
+from semgrid_edu.pipeline import FrameResult, run_pipeline
 from semgrid_edu.storage.files import sha256, write_json
 from semgrid_edu.storage.provenance import made_by
 
@@ -19,7 +22,9 @@ PEDESTRIAN = KITTI_14.index("pedestrian")
 
 
 def crowd(weights: Path) -> dict[str, object]:
-    """Return the SHA-256 of a network, and its counts on each frame: cells called pedestrian, labelled so, and both.
+    """Return how many cells of each shipped frame a network calls pedestrian, and how many of these are labelled so.
+
+    Both are counted before and after the CRF.
 
     Parameters
     ----------
@@ -27,14 +32,25 @@ def crowd(weights: Path) -> dict[str, object]:
         The network's file.
     """
     drive = real_drive()
-    net = load_net(weights, drive.camera)
-    counts: dict[str, list[int]] = {"called": [], "labelled": [], "right": []}
-    for result in run_pipeline(drive, net):
-        labelled = grid_truth(result.frame.labels, result.belief.probability, net.architecture.grid) == PEDESTRIAN
-        called = result.grid.argmax(axis=0) == PEDESTRIAN
-        for name, cells in zip(counts, (called, labelled, called & labelled), strict=True):
-            counts[name].append(int(cells.sum()))
-    return {"weights": sha256(weights), **counts}
+    maps = {"map": {"called": [], "right": []}, "after the CRF": {"called": [], "right": []}}
+    for result in run_pipeline(drive, load_net(weights, drive.camera)):
+        labelled = people(result)
+        for name, classes in zip(maps, (result.grid, result.refined), strict=True):
+            called = classes.argmax(axis=0) == PEDESTRIAN
+            maps[name]["called"].append(int(called.sum()))
+            maps[name]["right"].append(int((called & labelled).sum()))
+    return {"weights": sha256(weights), **maps}
+
+
+def people(result: FrameResult) -> NDArray[np.bool_]:
+    """Return which cells of a frame are labelled pedestrian, (H, W).
+
+    Parameters
+    ----------
+    result : FrameResult
+        What the pipeline made of the frame, on the compact grid.
+    """
+    return grid_truth(result.frame.labels, result.belief.probability, GridSpec.compact()) == PEDESTRIAN
 
 
 def main(without_gaps: Path, out: Path) -> None:
@@ -52,7 +68,10 @@ def main(without_gaps: Path, out: Path) -> None:
         "the same without --fill-gaps": without_gaps,
         "mean of three SegNets": segnet_real_weights(),
     }
-    result = {name: crowd(weights) for name, weights in networks.items()}
+    result: dict[str, object] = {name: crowd(weights) for name, weights in networks.items()}
+    drive = real_drive()
+    labelled = [int(people(one).sum()) for one in run_pipeline(drive, load_net(real_weights(), drive.camera))]
+    result["labelled"] = labelled
     write_json(out, result | made_by("python -m worlds.lecture_00_crowd WITHOUT_GAPS OUT", "numpy", "torch", "numba"))
 
 

@@ -11,7 +11,7 @@ from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14, SYNTHIA_10, UNKNOWN_OF_STATE, LabelSet
 
 GAP = 1.0
-"""Half the side of a square around a cell, metres: without a label in it, nobody knows what the cell holds."""
+"""How far around a cell a square without any label must reach for the cell to count as unknown, metres."""
 
 
 def grid_truth(labels: FrameLabels, belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
@@ -113,7 +113,7 @@ def fill_unlabelled(truth: NDArray[np.uint8], belief_probability: NDArray, label
 
 
 def fill_gaps_with_unknown(truth: NDArray[np.uint8], belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
-    """Give an unknown class to unlabelled cells without a label nearby, up to `GAP` metres away.
+    """Give an unknown class to cells in whose surroundings, a square that reaches `GAP` metres, there is no label.
 
     Labels of real streets come from LIDAR returns. Behind a wall there are none, and a network that is never corrected
     there calls these cells anything. Close to labels a return was only missed by chance, so these cells stay open.
@@ -134,7 +134,7 @@ def fill_gaps_with_unknown(truth: NDArray[np.uint8], belief_probability: NDArray
 
     Examples
     --------
-    A road of one cell; beside it a cell of half a metre, and one three cells away that no beam has reached:
+    Beside one cell of road, the cells up to a metre away stay open; those farther away become unknown:
 
     >>> belief = np.eye(4)[[0, 0, 3, 3, 3]].T.reshape(4, 1, 5)
     >>> fill_gaps_with_unknown(np.array([[0, 255, 255, 255, 255]], np.uint8), belief, GridSpec.compact())

@@ -25,8 +25,8 @@ class ReturnsFusion(nn.Module):
     frames. Here the scan chooses the planes: nothing reduces them, and the conv-deconv network sees the scores at each
     cell's lowest and highest return, the occupancy grid, how far both are above the ground, and whether there is any.
 
-    A cell is never called unknown if a beam came back from it and its return is in the camera's view: no label calls it
-    so.
+    A cell is hardly ever called unknown if a beam came back from it and its return is in the camera's view, because few
+    labels call it so.
 
     Parameters
     ----------
