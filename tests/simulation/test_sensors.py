@@ -67,6 +67,23 @@ def test_range_noise_is_two_centimetres():
     assert (ranges[ahead] - exact).std() == pytest.approx(0.02, rel=0.1)
 
 
+def test_intensity_scatters_falls_with_range_and_reads_0_far_away_as_on_kittis_scanner():
+    """There 6 % of the returns from 10 to 20 m read exactly 0, and 70 % from 40 to 80 m; a lane's scatter by 0.11."""
+    intensity = {}
+    for distance in (12.0, 60.0):
+        plaster = box((distance + 0.5, 0, 2), (1, 200, 20), (0.5,) * 3, Material.PLASTER, Kind.BUILDING)
+        lidar = Lidar(range_sigma=0.0)
+        points = labelled_scan(at(scene(plaster)), at(POSE), lidar, ROAD, np.random.default_rng(0))[0]
+        ahead = (np.abs(points[:, 0] - distance) < 0.5) & (np.abs(points[:, 1]) < 5)
+        intensity[distance] = points[ahead, 3]
+    near, far = intensity[12.0], intensity[60.0]
+    assert near.min() >= 0
+    assert near.max() < 1
+    assert near.std() == pytest.approx(0.1, abs=0.02)
+    assert (near == 0).mean() < 0.1
+    assert (far == 0).mean() > 0.5
+
+
 def test_dark_and_distant_surfaces_lose_more_returns():
     def share(material, x):
         thing = box((x + 0.5, 0, 2), (1, 200, 20), (0.5,) * 3, material, Kind.BUILDING)

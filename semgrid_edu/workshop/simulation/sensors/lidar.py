@@ -13,6 +13,8 @@ from semgrid_edu.workshop.simulation.things.materials import REFLECTANCE, Kind, 
 
 _RANGE = 100.0
 """Maximum range, metres. The HDL-64E sees dark surfaces up to 80 m and bright ones up to 120 m."""
+_FADED, _SCATTER = 0.15, 0.1
+"""How much lower the intensity of a return is that comes from 30 m, and the standard deviation of intensities."""
 _SECTOR = 30.0
 """Road users are frozen while the scanner turns by this angle, degrees. At 14 m/s they would move 12 cm."""
 
@@ -60,8 +62,10 @@ def labelled_scan(
     signal = reflectance * (0.15 + 0.85 * cosine) * (25.0 / np.maximum(distance, 8.0)) ** 2
     kept = draws[number] > lidar.dropout + np.exp(-signal / lidar.weak_signal)
     measured_range = distance + lidar.range_sigma * range_noise[number]
-    intensity = (reflectance * (0.4 + 0.6 * cosine) * (1 + 0.15 * gain_noise[number])).clip(0, 0.99)
-    points = np.column_stack([rays[number] * measured_range[:, None], np.round(intensity, 2)])
+    # As KITTI's scanner gives it: it falls with the square of the range, scatters, and weak returns read exactly 0.
+    faded = _FADED * (distance / 30.0) ** 2
+    intensity = reflectance * (0.8 + 0.2 * cosine) - faded + _SCATTER * gain_noise[number]
+    points = np.column_stack([rays[number] * measured_range[:, None], np.round(intensity.clip(0, 0.99), 2)])
     return points[kept].astype(np.float32), kinds[kept]
 
 
