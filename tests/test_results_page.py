@@ -106,6 +106,9 @@ def test_the_crowd_that_is_not_there():
     assert f"it finds {right['s']}; after the CRF, {sum(after['right'])}." in page
     assert f"it calls {cells['w']} of each frame *pedestrian*, and finds {right['w']}." in page
     assert f"finds {right['t']}, and calls {cells['t']} *pedestrian*" in page
+    lecture = (DOCS.parent / "notebooks" / "src" / "00_tour.py").read_text(encoding="utf-8")
+    assert f"calls [{without['called'][-1]} cells](../docs/results/crowd.json) of this frame *pedestrian*" in lecture
+    assert (without["right"][-1], counts["labelled"][-1]) == (7, 10)  # "finds seven" of "the ten true cells"
 
 
 def test_cars_on_their_tops():
