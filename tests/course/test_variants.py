@@ -4,6 +4,7 @@ import re
 import shutil
 import sys
 
+import pytest
 from nbgrader.utils import is_grade
 
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
@@ -29,14 +30,27 @@ def passes(cells, names, task):
     return True
 
 
+def forget_instructor():
+    """Let the next import of the instructor's modules find them anew."""
+    for name in [name for name in sys.modules if name.split(".")[0] == "semgrid_instructor"]:
+        del sys.modules[name]
+
+
+@pytest.fixture
+def instructor_forgotten():
+    """No module of the instructor before the test, and none of its variant after it, which others would meet."""
+    forget_instructor()
+    yield
+    forget_instructor()
+
+
+@pytest.mark.usefixtures("instructor_forgotten")
 def test_the_guides_private_variant_passes_with_its_answer_and_not_with_the_public_one(tmp_path, monkeypatch):
     guide = (NOTEBOOKS / "instructor" / "README.md").read_text(encoding="utf-8")
     exercise, hidden = re.findall(r"```diff\n(.*?)```", guide, re.DOTALL)
     shutil.copytree(NOTEBOOKS / "instructor" / "semgrid_instructor", tmp_path / "semgrid_instructor")
     checks = tmp_path / "semgrid_instructor" / "bayes.py"
     checks.write_text(changed(checks.read_text(encoding="utf-8"), hidden), encoding="utf-8")
-    for name in [name for name in sys.modules if name.split(".")[0] == "semgrid_instructor"]:
-        monkeypatch.delitem(sys.modules, name)
     monkeypatch.syspath_prepend(str(tmp_path))
     source = NOTEBOOKS / "src" / "exercises" / "01_bayes.py"
     private = tmp_path / "01_bayes.py"
