@@ -1,4 +1,4 @@
-"""How many cells of the shipped street networks call pedestrian, and how many are (section 4).
+"""How many cells of the shipped street some networks call pedestrian, and how many are labelled so (section 4).
 
 A network that nothing corrects far from labels may call these cells anything, and no score over labelled cells sees it.
 """
@@ -9,12 +9,13 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from semgrid_edu.datasets import grid_truth
+from semgrid_edu.datasets.frames import visible_labels
 from semgrid_edu.datasets.samples import real_drive, real_weights, segnet_real_weights
 from semgrid_edu.fast import load_net
+from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.pipeline import FrameResult, run_pipeline
+from semgrid_edu.pipeline import run_pipeline
 from semgrid_edu.storage.files import sha256, write_json
 from semgrid_edu.storage.provenance import made_by
 
@@ -34,7 +35,7 @@ def crowd(weights: Path) -> dict[str, object]:
     drive = real_drive()
     maps = {"map": {"called": [], "right": []}, "after the CRF": {"called": [], "right": []}}
     for result in run_pipeline(drive, load_net(weights, drive.camera)):
-        labelled = people(result)
+        labelled = people(result.frame)
         for name, classes in zip(maps, (result.grid, result.refined), strict=True):
             called = classes.argmax(axis=0) == PEDESTRIAN
             maps[name]["called"].append(int(called.sum()))
@@ -42,15 +43,15 @@ def crowd(weights: Path) -> dict[str, object]:
     return {"weights": sha256(weights), **maps}
 
 
-def people(result: FrameResult) -> NDArray[np.bool_]:
-    """Return which cells of a frame are labelled pedestrian, (H, W).
+def people(frame: Frame) -> NDArray[np.bool_]:
+    """Return which cells of the compact grid are labelled pedestrian, (H, W).
 
     Parameters
     ----------
-    result : FrameResult
-        What the pipeline made of the frame, on the compact grid.
+    frame : Frame
+        A labelled frame.
     """
-    return grid_truth(result.frame.labels, result.belief.probability, GridSpec.compact()) == PEDESTRIAN
+    return visible_labels(frame.labels, GridSpec.compact()) == PEDESTRIAN
 
 
 def main(without_gaps: Path, out: Path) -> None:
@@ -69,9 +70,7 @@ def main(without_gaps: Path, out: Path) -> None:
         "mean of three SegNets": segnet_real_weights(),
     }
     result: dict[str, object] = {name: crowd(weights) for name, weights in networks.items()}
-    drive = real_drive()
-    labelled = [int(people(one).sum()) for one in run_pipeline(drive, load_net(real_weights(), drive.camera))]
-    result["labelled"] = labelled
+    result["labelled"] = [int(people(frame).sum()) for frame in real_drive()]
     write_json(out, result | made_by("python -m worlds.lecture_00_crowd WITHOUT_GAPS OUT", "numpy", "torch", "numba"))
 
 

@@ -115,8 +115,9 @@ def fill_unlabelled(truth: NDArray[np.uint8], belief_probability: NDArray, label
 def fill_gaps_with_unknown(truth: NDArray[np.uint8], belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
     """Give an unknown class to cells in whose surroundings, a square that reaches `GAP` metres, there is no label.
 
-    Labels of real streets come from LIDAR returns. Behind a wall there are none, and a network that is never corrected
-    there calls these cells anything. Close to labels a return was only missed by chance, so these cells stay open.
+    The paper calls every unlabelled cell unknown (section 4). Labels of real streets come from LIDAR returns. Behind a
+    wall there are none, and a network that is never corrected there calls these cells anything. Close to labels a
+    return was only missed by chance, so here these cells stay open.
 
     Parameters
     ----------

@@ -113,8 +113,8 @@ POOR = (
 )
 """What to expect on a drive without labels, with weights that have no card."""
 
-PAPERS_ALONE = {"segment", "sample", "fuse"}
-"""Stages that a network with return heights runs in another way than the paper: on larger images, probabilities, l."""
+IMAGE_TO_MAP = {"segment", "sample", "fuse"}
+"""Stages that are made for one network: for its image size, its planes, and whether it sees return heights."""
 
 STORIES = 200_000
 """How many cells have a story at most, in all frames together: a story takes about 55 bytes of the page."""
@@ -180,7 +180,7 @@ def write_demo(
     """
     chosen = ChosenFrames.of(len(drive), frames)
     mine = load_stages(stages) if stages is not None else Stages()
-    weights = weights or (segnet_real_weights() if PAPERS_ALONE & set(mine.given) else real_weights())
+    weights = weights or (segnet_real_weights() if IMAGE_TO_MAP & set(mine.given) else real_weights())
     net = load_net(weights, drive.camera)
     card = _card_beside(weights)
     known = card.get("other_streets", "")
