@@ -106,8 +106,10 @@ def run_frame(frame: Frame, stages: Stages) -> FrameResult:
     clock.lap("sample")
 
     # (p, o) -> g: a small network fuses planes and occupancy into the semantic grid (section 3.4).
-    # A stage with a third argument also gets the heights of the returns; the paper's network has none.
-    log_grid = stages.fuse(planes, occupancy, *stages.return_heights(frame))
+    if stages.return_heights is None:
+        log_grid = stages.fuse(planes, occupancy)
+    else:  # the network for real streets also gets the heights of the returns; the paper's doesn't
+        log_grid = stages.fuse(planes, occupancy, stages.return_heights(frame))
     clock.lap("fuse")
 
     # g -> g: a fully connected CRF refines the grid (section 3.5, equations (3) and (4)).

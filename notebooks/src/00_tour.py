@@ -569,7 +569,7 @@ assert 74 < scores_of(silent)[0] < 77
 # %% tags=["nbval-ignore-output"] jupyter={"source_hidden": true}
 taught = Stages.fast(load_net(samples.real_weights(), street.camera))
 its_planes = taught.sample(taught.segment(network_image(frame, taught.image_size)))
-called = taught.fuse(its_planes, occupancy, *taught.return_heights(frame)).argmax(axis=0)
+called = taught.fuse(its_planes, occupancy, taught.return_heights(frame)).argmax(axis=0)
 found = (called[is_one] == PEDESTRIAN).sum()
 print(
     f"{(called == PEDESTRIAN).sum()} called pedestrian, {found} of them right; pixel accuracy {scores_of(called)[0]:.0f} %"

@@ -51,6 +51,6 @@ def unrefined(spec: GridSpec) -> list[Unrefined]:
         if number in FRAMES:
             frame, o = frames[number], belief.probability
             image = network_image(frame, net.architecture.image_size)
-            log_g = stages.fuse(stages.sample(stages.segment(image)), o, *stages.return_heights(frame))
+            log_g = stages.fuse(stages.sample(stages.segment(image)), o)
             maps.append(Unrefined(np.asarray(log_g), o, grid_truth(frame.labels, o, spec)))
     return maps

@@ -216,7 +216,7 @@ class SemanticGridNet(nn.Module):
             self.check_return_heights(return_heights, len(image))  # before the image network, which takes longest
         scores = self.segment(image, mirrored)
         planes = self.sample(scores, sampler)
-        return NetOutputs(scores, planes, self.fuse(planes, occupancy, mirrored, return_heights))
+        return NetOutputs(scores, planes, self.fuse(planes, occupancy, return_heights, mirrored))
 
     def segment(self, image: Tensor, mirrored: bool = False) -> Tensor:
         """Return s, the image network's scores. Parameters are those of `SemanticGridNet.stages`.
@@ -245,7 +245,7 @@ class SemanticGridNet(nn.Module):
         return (sampler or self.sampler)(scores.softmax(dim=1) if self.uses_return_heights else scores)
 
     def fuse(
-        self, planes: Tensor, occupancy: Tensor, mirrored: bool = False, return_heights: Tensor | None = None
+        self, planes: Tensor, occupancy: Tensor, return_heights: Tensor | None = None, mirrored: bool = False
     ) -> Tensor:
         """Return the logits of the semantic grid from the sampled planes: (p, o) -> g.
 

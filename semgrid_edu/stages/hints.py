@@ -23,14 +23,11 @@ STAGES = {
 }
 """The names of the paper's stages, in their order, and of the arguments that a function for each of them takes."""
 
-RETURN_HEIGHTS = "return_heights"
-"""A third argument that a function for `fuse` may take: the lowest and the highest return of each cell."""
-
 REMEMBER = {"remember": ("views", "spec")}
 """The stage that the paper leaves out: without it, classes are forgotten at every frame."""
 
 
-def check_usage(name: str, stage: object) -> None:
+def check_usage(name: str, stage: object, takes: tuple[str, ...]) -> None:
     """Reject what can't be called as a stage is.
 
     Parameters
@@ -39,17 +36,15 @@ def check_usage(name: str, stage: object) -> None:
         Name of the stage, a key of `STAGES` or `REMEMBER`.
     stage : object
         A function, or for a stage with a memory an object with `step(frame)`.
+    takes : tuple of str
+        The names of the arguments that it is called with.
 
     Raises
     ------
     ArgumentError
         When it is neither, or takes another number of arguments.
     """
-    takes = (STAGES | REMEMBER)[name]
     usage = f"a function {name}({', '.join(takes)})"
-    if name == "fuse":
-        usage += f" or fuse(p, o, {RETURN_HEIGHTS})"
-        takes += (RETURN_HEIGHTS,) * takes_return_heights(stage)
     if "spec" in takes:
         usage += " or an object with step(frame)"
     if isinstance(stage, type):
@@ -66,20 +61,6 @@ def check_usage(name: str, stage: object) -> None:
         signature.bind(*takes)
     except TypeError as error:
         raise ArgumentError(name, usage, f"{name}{signature}") from error
-
-
-def takes_return_heights(fuse: object) -> bool:
-    """Return whether a stage `fuse` has an argument named `return_heights`.
-
-    Parameters
-    ----------
-    fuse : object
-        What may be a function, or a `CheckedStage` around one.
-    """
-    try:
-        return RETURN_HEIGHTS in inspect.signature(fuse).parameters
-    except (TypeError, ValueError):  # not a function, or one written in C
-        return False
 
 
 def where(function: Callable) -> str:

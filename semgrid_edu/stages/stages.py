@@ -7,7 +7,7 @@ import copy
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, wraps
+from functools import wraps
 from typing import Any, Protocol
 
 import numpy as np
@@ -25,7 +25,7 @@ from semgrid_edu.memory import ClassMemory, MemoryParams
 from semgrid_edu.networks import Architecture, SemanticGridNet, load_net
 from semgrid_edu.occupancy import CmcdotParams, DriveTracker
 from semgrid_edu.planes import cell_heights
-from semgrid_edu.stages.hints import REMEMBER, STAGES, check_usage, takes_return_heights
+from semgrid_edu.stages.hints import REMEMBER, STAGES, check_usage
 from semgrid_edu.stages.stepping import checked
 
 
@@ -61,8 +61,8 @@ class Stages:
         `uses_return_heights` it returns class probabilities: the soft-max of s, sampled.
     fuse : callable, optional
         (p, o) -> g: `fuse(p (C, D, H, W), o (4, H, W))` returns log g (C, H, W) float, natural logarithms of
-        probabilities: exp(log g) sums to 1 in each cell. A function with a third argument `return_heights` also gets
-        the lowest and the highest return of each cell, (2, H, W) metres, NaN without a return (`cell_heights`).
+        probabilities: exp(log g) sums to 1 in each cell. In a set with `return_heights` it gets them as a third
+        argument.
     refine : callable, optional
         g -> g: `refine(log_g (C, H, W), o (4, H, W))` returns g (C, H, W) float, probabilities that sum to 1 in each
         cell.
@@ -73,6 +73,9 @@ class Stages:
         g -> g over frames: an object whose `step(view)` returns (C, H, W) float, probabilities that sum to 1 in each
         cell, for a `View` (frame, belief and g of that frame alone). Or a generator function `remember(views, spec)`.
         Without it nothing is remembered.
+    return_heights : callable, optional
+        `return_heights(frame)` returns what `fuse` is to know of the scan beside o: the lowest and the highest return
+        of each cell, (2, H, W) metres, NaN without a return (`cell_heights`). The paper's network has no such input.
 
     Raises
     ------
@@ -94,21 +97,20 @@ class Stages:
     refine: Callable[[NDArray, NDArray], NDArray] | None = None
     architecture: Architecture | None = None
     remember: Tracker | Callable | None = None
+    return_heights: Callable[[Frame], NDArray] | None = None
 
     def __post_init__(self) -> None:
         """Reject what can't be called as its stage is."""
+        takes = STAGES | REMEMBER
+        if self.return_heights is not None:
+            takes["fuse"] += ("return_heights",)
         for name in self.given:
-            check_usage(name, getattr(self, name))
+            check_usage(name, getattr(self, name), takes[name])
 
     @property
     def given(self) -> tuple[str, ...]:
         """The names of the stages that weren't left out, in their order."""
         return tuple(name for name in STAGES | REMEMBER if getattr(self, name) is not None)
-
-    @cached_property
-    def wants_return_heights(self) -> bool:
-        """Whether `fuse` has the argument `return_heights`."""
-        return takes_return_heights(self.fuse)
 
     @property
     def image_size(self) -> tuple[int, int]:
@@ -182,7 +184,7 @@ class Stages:
             return cls.of(net, occupancy, **options)
 
     def over(self, other: "Stages") -> "Stages":
-        """Return these stages, and those of `other` where one was left out.
+        """Return these stages, and those of `other` where one was left out; `return_heights` comes with `fuse`.
 
         Parameters
         ----------
@@ -196,7 +198,10 @@ class Stages:
         """
         if self.architecture and self.architecture.layout != other.architecture.layout:
             raise ArgumentError("architecture", f"that of the other stages, {other.architecture}", self.architecture)
-        return replace(other, **{name: getattr(self, name) for name in self.given})
+        filled = {name: getattr(self, name) for name in self.given}
+        if self.fuse is not None:
+            filled["return_heights"] = self.return_heights
+        return replace(other, **filled)
 
     @classmethod
     def completed(
@@ -224,18 +229,6 @@ class Stages:
             return stages
         return stages.over(cls.fast(load_net(sample_weights(), camera), memory=memory, **options))
 
-    def return_heights(self, frame: Frame) -> tuple[NDArray[np.float64], ...]:
-        """Return what `fuse` takes after p and o: the result of `cell_heights` if it asks for it, otherwise nothing.
-
-        Parameters
-        ----------
-        frame : Frame
-            A frame with a scan.
-        """
-        if not self.wants_return_heights:
-            return ()
-        return (cell_heights(frame.points_grid, (self.architecture or Architecture()).grid),)
-
     def need_ready(self) -> None:
         """Raise an `ArgumentError` unless `run_frame` can run these stages: all five, and no generator among them."""
         self._need_all()
@@ -254,8 +247,8 @@ class Stages:
         self._need_all()
         architecture = self.architecture or Architecture()
         own = replace(self, track=copy.deepcopy(self.track), remember=copy.deepcopy(self.remember))
-        parts = {name: checked(name, getattr(own, name), architecture) for name in self.given}
-        return Stages(architecture=architecture, **parts)
+        parts = {name: checked(name, getattr(own, name), architecture) for name in own.given}
+        return replace(self, architecture=architecture, **parts)
 
 
 def network_stages(net: SemanticGridNet, memory: bool | MemoryParams) -> Stages:
@@ -268,18 +261,19 @@ def network_stages(net: SemanticGridNet, memory: bool | MemoryParams) -> Stages:
     """
     architecture = net.need_architecture()
 
-    def fuse(p: Tensor, o: Tensor) -> Tensor:
-        return net.fuse(p, o).log_softmax(dim=1)
+    def fuse(p: Tensor, o: Tensor, return_heights: Tensor | None = None) -> Tensor:
+        return net.fuse(p, o, return_heights).log_softmax(dim=1)
 
-    def fuse_at_returns(p: Tensor, o: Tensor, return_heights: Tensor) -> Tensor:
-        return net.fuse(p, o, return_heights=return_heights).log_softmax(dim=1)
+    def return_heights(frame: Frame) -> NDArray[np.float64]:
+        return cell_heights(frame.points_grid, architecture.grid)
 
     return Stages(
         segment=_on_arrays(net.segment),
         sample=_on_arrays(net.sample),
-        fuse=_on_arrays(fuse_at_returns if architecture.uses_return_heights else fuse),
+        fuse=_on_arrays(fuse),
         architecture=architecture,
         remember=_memory(memory, architecture),
+        return_heights=return_heights if architecture.uses_return_heights else None,
     )
 
 

@@ -49,43 +49,31 @@ def test_the_returns_of_the_vehicle_itself_are_not_seen(drive, net):
     np.testing.assert_array_equal(stages.return_heights(marked), stages.return_heights(frame))
 
 
-def test_a_stage_of_ones_own_gets_heights_only_if_it_asks(drive, net):
+def test_a_fuse_of_ones_own_brings_its_heights_or_gets_none(drive, net):
     frame, given = drive[0], []
 
-    def asks(p, o, return_heights):
+    def fuse(p, o, return_heights):
         given.append(return_heights)
         return even(p, o)
 
-    def optional(p, o, scale=1.0):
-        given.append(scale)
-        return even(p, o)
+    def heights(frame):
+        return cell_heights(frame.points_grid, ARCHITECTURE.grid)
 
-    for fuse in (even, asks, optional):
-        (result,) = run_pipeline([frame], replace(Stages.fast(net, FEW), fuse=fuse))
+    usual = Stages.fast(net, FEW)
+    for own in (Stages(fuse=even), Stages(fuse=fuse, return_heights=heights)):
+        (result,) = run_pipeline([frame], own.over(usual))
         np.testing.assert_allclose(result.grid, 1 / 14, rtol=1e-5)
-    heights, scale = given
-    np.testing.assert_array_equal(heights, cell_heights(frame.points_grid, ARCHITECTURE.grid))
-    assert scale == 1.0
+    np.testing.assert_array_equal(given[0], heights(frame))
 
 
-def test_errors_of_a_stage_that_asks_for_heights(drive, net):
-    usage = r"fuse: expected a function fuse\(p, o\) or fuse\(p, o, return_heights\), found fuse\(p, return_heights\)"
+def test_a_fuse_that_takes_no_heights_is_refused_where_it_would_get_them(drive, net):
+    usage = r"fuse: expected a function fuse\(p, o, return_heights\), found fuse\(p, o\)"
     with pytest.raises(ArgumentError, match=usage):
-        Stages(fuse=lambda p, return_heights: even(p, return_heights))
-    stages = replace(Stages.fast(net, FEW), fuse=lambda p, o, return_heights: return_heights)
-    with pytest.raises(StageError, match=r"fuse .*expected shape \(14, 142, 62\)"):
-        next(run_pipeline(drive, stages))
-
-
-def test_an_object_around_a_stage_is_judged_by_its_own_arguments(drive, net):
-    class Around:
-        stage = staticmethod(lambda p, o, return_heights: None)
-
-        def __call__(self, p, o):
-            return even(p, o)
-
-    (result,) = run_pipeline([drive[0]], replace(Stages.fast(net, FEW), fuse=Around()))
-    np.testing.assert_allclose(result.grid, 1 / 14, rtol=1e-5)
+        replace(Stages.fast(net, FEW), fuse=even)
+    with pytest.raises(
+        ArgumentError, match=r"fuse: expected a function fuse\(p, o\), found fuse\(p, o, return_heights\)"
+    ):
+        Stages(fuse=lambda p, o, return_heights: even(p, o))
 
 
 def test_raw_scores_on_the_planes_are_refused(drive, net):

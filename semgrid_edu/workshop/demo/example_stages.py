@@ -7,8 +7,7 @@ A file of stages holds as many of these functions as you like; the package's own
     track(frames, spec)  l -> o         yields (4, H, W): probability of FREE, STATIC, DYNAMIC, UNKNOWN, for each frame
     segment(image)       i -> s         (3, h, w) RGB in 0..1 -> (C, h, w) scores
     sample(s)            s -> p         (C, h, w) -> (C, D, H, W): the scores on D planes above the ground
-    fuse(p, o)           (p, o) -> g    -> (C, H, W) log-probabilities of the classes; fuse(p, o, return_heights)
-                                        also gets each cell's lowest and highest return, (2, H, W) metres
+    fuse(p, o)           (p, o) -> g    -> (C, H, W) log-probabilities of the classes
     refine(log_g, o)     g -> g         -> (C, H, W) probabilities of the classes
     remember(views, spec)  g -> g       yields (C, H, W): what all frames so far say of each cell, for each frame
 """
