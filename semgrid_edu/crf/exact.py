@@ -171,6 +171,7 @@ def exact_marginals(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> N
     array([[0.8 , 0.78]])
     """
     model, shape = _tiny_model(unary, values, params)
+    # All cells are coupled to all others, so nothing can be summed out early: this is a table of all labellings.
     joint = eliminate(model, model.names).normalised()
     return np.stack([joint.marginal(name).table for name in model.names], axis=1).reshape(shape)
 
@@ -214,6 +215,7 @@ def _tiny_model(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> tuple
         raise ArgumentError("unary", expected, f"{classes} classes in {cells} cells, {classes}^{cells}")
     phi = unary.astype(np.float64)
     phi -= phi.min(axis=0)  # so that exp(-phi) neither overflows nor vanishes
+    # If even simple labellings cost too much, exp(-E) is 0 for all of them, and Z too.
     candidates = [np.full(phi.shape[1:], label) for label in range(classes)] + [phi.argmin(axis=0)]
     least = min(energy(labels, phi, values, params) for labels in candidates)
     if least > MAX_ENERGY:

@@ -45,6 +45,7 @@ def updates(
     while True:
         Q = np.exp(log_Q)
         yield Q.reshape(unary.shape)
+        # The exact optimum of each cell, all others fixed. Log Q goes only part of the way, see `damping`.
         target = -phi - disagreement(Q)
         log_Q = log_softmax((1 - part) * log_Q + part * target, axis=0)
 

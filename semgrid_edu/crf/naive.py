@@ -188,6 +188,7 @@ def mean_field_sequential(
     log_Q = log_softmax(-phi, axis=0)
     for _ in range(iterations):
         for i in range(phi.shape[1]):
+            # Cells before i have been updated in this sweep already, and count with their new distributions.
             disagreement = (1 - np.exp(log_Q)) @ weights[i]
             log_Q[:, i] = log_softmax(-phi[:, i] - disagreement)
     return np.exp(log_Q).reshape(unary.shape)

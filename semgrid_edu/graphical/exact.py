@@ -245,6 +245,7 @@ def _summed_out(
     power = 0
     factors = list(model.factors)
     for name in _checked_order(model, names, order):
+        # Multiply the factors that contain the variable, and put their product, summed over it, in their place.
         clique, more = rescaled_product(factor for factor in factors if name in factor.names)
         factors = [factor for factor in factors if name not in factor.names] + [clique.sum(name)]
         power += more

@@ -98,6 +98,7 @@ def sum_product(
     sliced = possible(model, given)
     labelled = zip(model.labels, sliced.factors, strict=True)
     factors = {label: factor.rescaled()[0] for label, factor in labelled if factor.names}
+    # Messages go first from the leaves of each part to its root, then back: on a tree two passes are exact.
     links = _links(factors, sliced.names)
     parts = _parts(links)
     outwards = [node for part in parts for node in part]
@@ -107,6 +108,7 @@ def sum_product(
     while not converged and iteration < iterations:
         iteration += 1
         before = dict(messages)
+        # A new message is used at once, so information crosses a whole chain in one iteration.
         for source in (*reversed(outwards), *outwards):
             for target in links[source]:
                 message = _message(source, target, links, factors, messages)

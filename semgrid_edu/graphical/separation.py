@@ -103,6 +103,7 @@ def _directed_steps(parents: Mapping[str, tuple[str, ...]], known: set[str]):
     opens = _with_ancestors(parents, known)
 
     def steps(name: str, from_parent: bool) -> list[tuple[str, bool]]:
+        # Coming from a parent and going up to a parent passes a collider, which only evidence below it opens.
         up = name in opens if from_parent else name not in known
         down = name not in known
         return [(above, False) for above in parents[name] if up] + [(child, True) for child in children[name] if down]

@@ -296,6 +296,7 @@ def carry_classes(
     carried.evidence[MOVES][:, *now] = memory.evidence[MOVES][:, *before]
     carried.weight[MOVES][*now] = memory.weight[MOVES][*before]
     carried.seen[MOVES][*now] = memory.seen[MOVES][*before]
+    # Whole cells have been moved; what remains is where in its new cell the thing is.
     rest = displacement + memory.offset[:, *before] - (before - now) * cell
     carried.offset[:, *now] = np.clip(rest, -cell / 2, cell / 2)
 
@@ -349,6 +350,7 @@ def recall_classes(
 
     moving = occupancy[State.DYNAMIC]
     classes = (1 - moving) * seen[STAYS] * belief[STAYS] + moving * seen[MOVES] * belief[MOVES]
+    # What a layer has never seen stays unknown: one unknown class for each state of the cell.
     layers = [MOVES if state == State.DYNAMIC else STAYS for state in range(N_STATES)]
     unknown = occupancy * (1 - seen[layers])
     return np.concatenate([classes, unknown])
@@ -394,6 +396,7 @@ def _joined(memory: MemoryState, look: Look, share: NDArray, params: MemoryParam
     All of them together count at most `params.max_weight`: beyond this the old ones lose weight.
     """
     sees = share * look.sees
+    # As long as the weight is below what is seen now, the frame fills it up; later frames add only their exponent.
     new = np.maximum(look.exponent * sees, sees - memory.weight)
     old = np.minimum(memory.weight, params.max_weight - new)
     total = np.maximum(old + new, 1e-12)[:, None]
@@ -469,15 +472,18 @@ class ClassMemory:
         """
         look = look_at(grid, belief.probability, self.spec, self.params)
         before = self._state_for(len(look.classes))
+        # The map follows the vehicle by whole cells: `moved` is the old memory in the map's new cells.
         shift, self.pose = scroll(self.pose.then(motion), self.spec.cell)
         old_spec = self.map_spec
         self.map_spec = map_around(self.spec, self.pose.dyaw)
         moved = before.at(places_of(self.map_spec, old_spec, shift))
 
+        # Belief and velocities are those of the vehicle's cells and axes; the map needs them in its own.
         on_grid = places_of(self.map_spec, self.spec, self.pose.inverse)
         moving = values_at(belief.probability[State.DYNAMIC], on_grid)
         velocity = np.einsum("ij,jhw->ihw", self.pose.rotation, values_at(belief.velocity, on_grid))
         self.predicted = carry_classes(moved, moving, velocity, self.spec.cell, dt, self.params)
+        # Recall before learning: otherwise the frame would be counted twice.
         self.here = places_of(self.spec, self.map_spec, self.pose)
         recalled = recall_classes(self.predicted, self.here, belief.probability, look, self.params)
         self.state = learn_classes(self.predicted, on_grid, look, self.params)

@@ -54,6 +54,7 @@ def smooth_drive(views: Sequence[View], spec: GridSpec, params: MemoryParams | N
     after = []
     for view in reversed(views):
         backward.step(_reversed_in_time(view))
+        # What the later frames say, without this one. The list ends with the first frame, so `pop` gives them in order.
         after.append(backward.predicted.at(backward.here))
 
     forward = ClassMemory(spec, params)

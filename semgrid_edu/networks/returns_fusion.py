@@ -57,6 +57,7 @@ class ReturnsFusion(nn.Module):
         self.heights = tuple(heights)
         self.cell = cell
         self.uses_occupancy = uses_occupancy
+        # Scores at two heights, four states, both heights above the ground, and whether there is a return.
         n_in = 2 * n_scores + N_STATES + 3
         with fresh_weights(self, seed):
             self.conv_deconv = ConvDeconv(n_in, n_classes, FusionNet.WIDTHS, FusionNet.DEPTHS, skips=True)

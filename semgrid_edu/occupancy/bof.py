@@ -30,6 +30,7 @@ def bof_move(state: BofState, spec: GridSpec, motion: PlanarMotion, to: GridSpec
     """
     check_shape("state", state.free, spec.shape)
     planes = np.concatenate([[state.unknown, state.free], state.occupied])
+    # Cells that enter the map have all their mass on the first plane, UNKNOWN.
     entering = np.eye(1, len(planes), dtype=np.float32)[0]
     moved = look_up(planes, entering, spec, to or spec, motion)
     velocity = state.velocity @ motion.rotation
@@ -68,6 +69,7 @@ def bof_predict(
     check_shape("state", state.occupied, (len(params.lattice), *spec.shape))
     M = transition_matrix(params.world, dt)
     cells, remainder = whole_cells(state, spec, dt)
+    # A velocity may move by no whole cell in this step. Its mass stays, and the way is added to the next step's.
     moves = cells.any(axis=1)
     occupied, going = _shifted(state, cells, M[DYNAMIC, DYNAMIC], params, dt)
     arrives = occupied.sum(axis=0, dtype=np.float64, where=moves[:, None, None])
@@ -85,6 +87,7 @@ def bof_predict(
     keep, take = strike_out(arrives, possible)
     newborn = keep * newborn
     for k in range(1, len(occupied)):
+        # As in `collide`: arrivals are scaled as possible arrivals, mass that stayed as what the cell held.
         occupied[k] *= take * believed[k] if moves[k] else keep
         occupied[k] += params.lattice.prior[k] * newborn
     occupied[0] = keep * mixed[STATIC]
@@ -203,6 +206,7 @@ def bof_velocity(state: BofState) -> tuple[NDArray[np.float32], NDArray[np.float
     """
     vx, vy = state.velocity[1:].T
     powers = np.stack([np.ones_like(vx), vx, vy, vx * vx, vx * vy, vy * vy]).astype(np.float32)
+    # Six sums over the velocities: of the mass, and of the mass times vx, vy, vx^2, vx vy and vy^2.
     moment = np.tensordot(powers, state.occupied[1:], axes=1)
     moment = np.where(moment[0] > 0, moment / np.where(moment[0] > 0, moment[0], 1), np.float32(np.nan))
     mean = moment[1:3]

@@ -53,6 +53,7 @@ class VelocityLattice:
         """(V, 2): the velocities of the lattice, m/s, from slow to fast; the first is zero."""
         steps = int(self.max_speed / self.spacing + 1e-9)
         x, y = (axis.ravel() for axis in np.mgrid[-steps : steps + 1, -steps : steps + 1])
+        # lexsort sorts by its last key first: by speed, then by x, then by y.
         order = np.lexsort((y, x, x**2 + y**2))
         lattice = np.stack([x, y], axis=1)[order] * float(self.spacing)
         return lattice[np.hypot(*lattice.T) <= self.max_speed * (1 + 1e-9)]

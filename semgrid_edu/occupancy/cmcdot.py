@@ -97,6 +97,7 @@ class Cmcdot:
         in_grid = evidence_of(scan, self.spec, PlanarMotion())
         driven = self._pose.rotation @ (motion.dx, motion.dy)
 
+        # The four steps of section 3.2, on the map.
         moved = move(self._state, self.map_spec, shift, map_spec)
         predicted = predict(moved, map_spec, self.params, dt, self._rng, driven)
         updated = update(predicted, map_spec, on_map, self.params)
@@ -105,6 +106,7 @@ class Cmcdot:
         self._pose = pose
         self.map_spec = map_spec
 
+        # What the filter hands out: the prediction and the scan in the vehicle's own cells, and velocities.
         cells = cells_of(resampled.particles.position, map_spec)
         velocity = velocity_moments(resampled.particles, cells, map_spec.shape)
         belief = local_belief(predicted.probability, velocity, in_grid, pose, map_spec, self.spec, self.params)
@@ -149,6 +151,7 @@ def local_belief(
     world : WorldModel
         What UNKNOWN cells turn out to be, `first_sight`.
     """
+    # The prediction comes from the map; the scan is counted in the vehicle's own cells.
     here = look_up(predicted, NOTHING_KNOWN, map_spec, spec, pose)
     prior, _ = initialise_unknown(here, in_grid.seen, world)
     probability = bayes(prior, in_grid)[0].astype(np.float32)

@@ -162,6 +162,7 @@ def scroll(pose: PlanarMotion, cell: float) -> tuple[PlanarMotion, PlanarMotion]
     >>> scroll(PlanarMotion(1.25, 0.0, 0.3), cell=0.5)
     (PlanarMotion(dx=1.0, dy=0.0, dyaw=0.0), PlanarMotion(dx=0.25, dy=0.0, dyaw=0.3))
     """
+    # The remainder of a division by the cell, between minus and plus half a cell.
     dx, dy = math.remainder(pose.dx, cell), math.remainder(pose.dy, cell)
     return PlanarMotion(pose.dx - dx, pose.dy - dy), PlanarMotion(dx, dy, pose.dyaw)
 
@@ -200,6 +201,7 @@ def shift_plane(plane: NDArray, cells: NDArray[np.int64]) -> NDArray:
     height, width = plane.shape
     up = max(-height, min(int(cells[0]), height))
     left = max(-width, min(int(cells[1]), width))
+    # x points to row 0, so a shift by +1 along x takes row 1 to row 0, and the last row is filled with zeros.
     shifted = np.zeros_like(plane)
     source = plane[max(up, 0) : height + min(up, 0), max(left, 0) : width + min(left, 0)]
     shifted[max(-up, 0) : height - max(up, 0), max(-left, 0) : width - max(left, 0)] = source

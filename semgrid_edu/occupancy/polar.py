@@ -96,6 +96,7 @@ def fill_gaps(reach: NDArray, gap: int) -> NDArray:
     if len(seen) == 0:
         return reach.copy()
     empty = np.flatnonzero(reach == 0)
+    # The nearest beams with returns on either side. Index -1 and the remainder close the circle behind the vehicle.
     following = np.searchsorted(seen, empty)
     left = seen[following - 1]
     right = seen[following % len(seen)]
@@ -213,6 +214,7 @@ def height_above_ground(points: NDArray, params: GroundParams) -> NDArray[np.flo
     distance = np.hypot(x, y)
     sector = beams_of(x, y, params.sectors)
     profile = np.full((params.sectors, params.bins), np.nan)
+    # Sort the returns by sector, then cut the sorted list wherever a new sector begins.
     order = np.argsort(sector, kind="stable")
     seen, first = np.unique(sector[order], return_index=True)
     for s, returns in zip(seen, np.split(order, first[1:]), strict=False):
@@ -255,10 +257,12 @@ def walk_sector(distance: NDArray, z: NDArray, params: GroundParams) -> NDArray[
     last = np.append(first[1:], len(z)) - 1
     lowest = order[first]
     spread = z[order[last]] - z[lowest]
+    # The walk starts at the vehicle, which stands on ground of height 0.
     ground_at = [0.0]
     ground = [0.0]
     for at, height, rise in zip(distance[lowest].tolist(), z[lowest].tolist(), spread.tolist(), strict=True):
         farther = min(at - ground_at[-1], params.gap)
+        # Steep over a short way, gentle over a long one.
         allowed = min(params.step + params.slope * farther, params.rise + params.grade * farther)
         if rise <= params.rise and abs(height - ground[-1]) <= allowed:
             ground_at.append(at)
@@ -276,6 +280,7 @@ def _median_of_neighbours(profile: NDArray, neighbours: int) -> NDArray[np.float
     """Take the median over each sector and its neighbours, (S, B); NaN marks sectors without returns."""
     around = range(-neighbours, neighbours + 1)
     beside = np.sort([np.roll(profile, k, axis=0) for k in around], axis=0)  # NaN comes last
+    # Of n known profiles the median is the middle one, or the mean of the middle two.
     known = np.isfinite(beside[:, :, 0]).sum(axis=0)
     each = np.arange(len(profile))
     return (beside[np.maximum(known - 1, 0) // 2, each] + beside[known // 2, each]) / 2

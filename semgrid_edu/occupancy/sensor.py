@@ -372,6 +372,7 @@ class Scan:
         height = self.points[:, 2]
         obstacle = (height >= self.sensor.obstacle_min) & (height <= self.sensor.obstacle_max)
         xy = pose.parent_from_child(self.points[:, :2])
+        # What speaks about a cell: obstacle returns in it, ground returns in it, and the beam through its centre.
         obstacles = count_in_cells(xy[obstacle], spec)
         ground = count_in_cells(xy[height < self.sensor.obstacle_min], spec)
         beyond = beyond_reach(self.reach, spec, pose)
@@ -459,6 +460,7 @@ def without_own_returns(points: NDArray, sensor: SensorModel) -> NDArray:
     if columns > 4:  # the reader knows which returns are the vehicle's own
         return points[points[:, 4] == 0, :3]
     no_light = points[:, 3] == 0 if columns > 3 else np.zeros(len(points), bool)
+    # Only returns without any light can lie outside the outline and still be the vehicle's own.
     around = np.where(no_light, edge_of_splits(points, sensor.edge), 0.0)
     x_min, x_max, y_min, y_max = sensor.vehicle
     beside = (x > x_min - around) & (x < x_max + around) & (y > y_min - around) & (y < y_max + around)

@@ -343,6 +343,7 @@ def systematic_resample(weight: NDArray, count: int, offset: float) -> NDArray[n
     array([1, 1, 1, 2])
     """
     ends = np.cumsum(weight, dtype=np.float64)
+    # On a line from 0 to the sum of all weights, index i owns the piece that ends at ends[i].
     points = (np.arange(count) + offset) / count * ends[-1]
     chosen = np.searchsorted(ends, points, side="right")
     last = np.flatnonzero(weight)[-1]
@@ -401,6 +402,7 @@ def draw_newborn(
     chosen = draw_indices(resampling, newborn.ravel(), count, rng)
     corner = np.stack(np.unravel_index(chosen, spec.shape), axis=1)
     inside = rng.random(corner.shape, np.float32)
+    # Row 0 and column 0 are at the largest x and y, so places are counted backwards from there.
     position = (spec.x_max, spec.y_max) - (corner + inside) * spec.cell
     velocity = draw_velocities(len(chosen), max_speed, rng)
     return Particles(position, velocity, equal_weights(newborn, len(chosen)))

@@ -59,8 +59,10 @@ def move(state: FilterState, spec: GridSpec, motion: PlanarMotion, to: GridSpec 
     probability = look_up(state.probability, NOTHING_KNOWN, spec, to, motion)
     particles = transform(state.particles, motion)
     cells = cells_of(particles.position, to)
+    # The weights in a cell may exceed 1 when two old cells empty their particles into it.
     claimed = weight_in_cells(particles.weight, cells, to.shape)
     dynamic = np.minimum(claimed, 1)
+    # The particles have decided P(DYNAMIC). The other three states share the rest in their old proportions.
     others = probability[FREE] + probability[STATIC] + probability[UNKNOWN]
     probability = probability * ratio(1 - dynamic, others)
     probability[DYNAMIC] = dynamic
@@ -101,11 +103,13 @@ def predict(
     particles = stay_in_motion(state.particles, world, M, dt)
     start = cells_of(particles.position, spec)
     going = weight_in_cells(particles.weight, start, spec.shape)
+    # So far nothing has left its cell: this is the world into which the particles fly.
     mixed, newborn = mix(state.probability, state.newborn, going, M)
 
     particles = fly(particles, world.max_acceleration, dt, rng)
     end = cells_of(particles.position, spec)
     vacated = weight_in_cells(particles.weight * (end != start), start, spec.shape)
+    # Space that a thing has only just left was not seen free by any scan, so it counts as unseen.
     doubt = world.walls.doubt(particles, end, mixed, mixed[UNKNOWN] + vacated, spec, driven, dt)
     blocked = at_cells(mixed[STATIC], end) + doubt
     return collide(mixed, newborn, particles, start, end, vacated, blocked)
@@ -131,9 +135,11 @@ def update(state: FilterState, spec: GridSpec, evidence: Evidence, world: WorldM
     """
     check_shape("state", state.newborn, spec.shape)
     check_shape("evidence", evidence.free, spec.shape)
+    # UNKNOWN isn't a thing that a beam could meet: a cell that is seen must be one of the other three.
     prior, born = initialise_unknown(state.probability, evidence.seen, world)
     posterior, factor = bayes(prior, evidence)
     cells = cells_of(state.particles.position, spec)
+    # One factor for all particles of a cell, because a scan shows no velocities.
     particles = replace(state.particles, weight=state.particles.weight * at_cells(factor, cells))
     posterior = world.walls.clear_wakes(posterior, particles, cells, ~evidence.seen, spec)
     return FilterState(posterior, particles, (state.newborn + born) * factor)
@@ -190,6 +196,7 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
         When the state covers cells other than `spec`, or the resampling doesn't return indices.
     """
     check_shape("state", state.newborn, spec.shape)
+    # A fixed part of the particles goes to births, so that things just seen are never short of hypotheses.
     births = round(params.birth_share * params.n_particles)
     old = draw_again(state.particles, params.n_particles - births, params.resampling, rng)
     new = draw_newborn(state.newborn, spec, births, params.max_speed, params.resampling, rng)
@@ -197,6 +204,7 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
     velocity = np.concatenate([old.velocity, new.velocity])
     weight = np.concatenate([old.weight, new.weight])
 
+    # Draws are random, so the weights drawn for a cell miss its dynamic probability by a little: scale them to it.
     cells = cells_of(position, spec)
     carried = weight_in_cells(weight, cells, spec.shape)
     probability = state.probability.astype(np.float64)
@@ -236,6 +244,7 @@ def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:
     """
     check_seconds(dt)
     R = np.array(world.rates, dtype=np.float64)
+    # What leaves a state arrives in another: each row of R sums to 0, so each row of exp(R dt) sums to 1.
     np.fill_diagonal(R, 0)
     np.fill_diagonal(R, -R.sum(axis=1))
     M = expm(R * min(dt, LONGEST))
@@ -284,8 +293,10 @@ def mix(
         The part of P(DYNAMIC) that has no particles: what other states have become DYNAMIC is included.
     """
     mixed = np.einsum("ij,ihw->jhw", M, probability)
+    # `going` counts the same particles after some have stopped; the difference is what now stands.
     carried = M[DYNAMIC, DYNAMIC] * (probability[DYNAMIC] - newborn)
     mixed[STATIC] += np.maximum(carried - going, 0)  # what has stopped
+    # Only newborn mass in the third place: what particles carry is in `going`, and must not be counted twice.
     without_particles = np.stack([probability[FREE], probability[STATIC], newborn, probability[UNKNOWN]])
     born = np.einsum("i,ihw->hw", M[:, DYNAMIC], without_particles)
     mixed[DYNAMIC] = born + going
@@ -331,6 +342,7 @@ def collide(
     stays = weight_in_cells(particles.weight * ~moved, end, shape)
     arrives = weight_in_cells(particles.weight * moved, end, shape)
     possible = weight_in_cells(particles.weight * moved * (1 - blocked), end, shape)
+    # What can't be true is struck out of the joint distribution; the two factors scale the rest to a sum of 1.
     keep, take = strike_out(arrives, possible)
     probability = keep * mixed
     probability[FREE] += keep * vacated  # what flew away leaves free space behind

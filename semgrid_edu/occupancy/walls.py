@@ -92,6 +92,7 @@ class Walls:
             Which fraction of this way; negative for the past.
         """
         path = self.clearing_time * velocity.astype(np.float64)
+        # A path that is too short is stretched to the least length, in its own direction.
         length = np.linalg.norm(path, axis=1, keepdims=True)
         least = self.clearing_cells * cell
         return fraction * path * np.maximum(1, ratio(np.full_like(length, least), length))
@@ -152,11 +153,13 @@ class Walls:
         before, shortly_before, ahead = (
             self._other_cells(particles, cells, spec, fraction) for fraction in (-1, -self.second_look, 1)
         )
+        # Suspicion: it comes out of a wall, or it would have driven through one shortly before.
         runs = np.hypot(*particles.velocity.T) > self.running_speed
         wall = mixed[STATIC] ** WALL_EXPONENT
         nearby = largest_nearby(wall)
         out_of_a_wall = np.where(runs, at_cells(nearby, before), at_cells(mixed[STATIC], before))
         through_a_wall = runs * at_cells(wall, shortly_before)
+        # Acquittal: free or moving space ahead. A gap beside a hedge acquits nothing that keeps pace with the car.
         beside_a_wall = keeps * at_cells(mixed[FREE] * largest_nearby(mixed[STATIC]), ahead)
         open_ahead = at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - beside_a_wall
         return np.maximum(out_of_a_wall, through_a_wall) * (1 - open_ahead) * at_cells(unseen, cells)

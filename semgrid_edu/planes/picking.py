@@ -26,6 +26,7 @@ def above_ground(return_heights: Tensor, cell: float) -> Tensor:
     """
     reach = round(REACH / cell)
     lowest = return_heights[..., :1, :, :].nan_to_num(nan=torch.inf)
+    # There is no min-pooling, so the negative of the largest negative height is taken.
     ground = -F.max_pool2d(-lowest, 2 * reach + 1, stride=1, padding=reach)
     return return_heights - ground
 
@@ -60,6 +61,7 @@ def pick_planes(planes: Tensor, z: Tensor, heights: Tensor | Sequence[float]) ->
     """
     heights = torch.as_tensor(heights, dtype=z.dtype, device=z.device)
     z = z.nan_to_num(nan=0.0).clamp(heights[0], heights[-1]).contiguous()
+    # z is between plane `below` and plane `above`; `share` is how far it is on the way from one to the other.
     above = torch.searchsorted(heights, z)
     below = (above - 1).clamp(min=0)
     distance = heights[above] - heights[below]  # zero on the lowest plane, which is both

@@ -246,6 +246,7 @@ class Stages:
         """Return the stages for one drive: with fresh copies of tracker and memory, and with their results checked."""
         self._need_all()
         architecture = self.architecture or Architecture()
+        # Copies, so that the next drive starts with the tracker and the memory as they were given.
         own = replace(self, track=copy.deepcopy(self.track), remember=copy.deepcopy(self.remember))
         parts = {name: checked(name, getattr(own, name), architecture) for name in own.given}
         return replace(self, architecture=architecture, **parts)
