@@ -56,8 +56,8 @@ def plane_sampler(architecture: Architecture, camera: Camera, sampler: type[nn.M
 class MeanSegmenter(nn.Module):
     """An ensemble of image networks: s is the mean of their scores.
 
-    Networks trained on the same few frames make different mistakes, so their mean makes fewer. The shipped real network
-    is such a mean of three.
+    Networks trained on the same few frames make different mistakes, so their mean makes fewer. The network of
+    `segnet_real_weights` is such a mean of three.
 
     Parameters
     ----------
