@@ -10,18 +10,20 @@ hands to the next.
 
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from semgrid_edu.camera import Camera
 from semgrid_edu.crf import CrfParams
+from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import Frame, resize_image
 from semgrid_edu.memory import MemoryParams, View
-from semgrid_edu.networks import SemanticGridNet
+from semgrid_edu.networks import Architecture, SemanticGridNet, load_net
 from semgrid_edu.occupancy import Belief, CmcdotParams
-from semgrid_edu.stages import REMEMBER, STAGES, StageError, Stages
+from semgrid_edu.stages import REMEMBER, STAGES, StageError, Stages, class_memory
 
 __all__ = [
     "REMEMBER",
@@ -142,10 +144,10 @@ def run_pipeline(
     stages : Stages or SemanticGridNet
         A set of stages, or a network from `build_net` or `load_net` for the camera of the drive, in evaluation mode.
         A network is run by `Stages.fast`, which also fills what a set leaves out: a set without `segment`, `sample` or
-        `fuse` gets the shipped SegNet. A drive begins with copies of tracker and memory, so the same set can be
-        used again.
+        `fuse` gets the shipped SegNet. The drive is run by copies of tracker and memory, so the same set can be used
+        for the next one.
     occupancy, crf, seed, memory
-        Parameters of the package's own stages, see `Stages.of`.
+        Parameters of the stages that the package adds, see `Stages.of`.
 
     Yields
     ------
@@ -155,7 +157,7 @@ def run_pipeline(
     Raises
     ------
     ArgumentError
-        When `stages` is neither, or a frame has no image.
+        When `stages` is neither, a frame has no image, or a parameter is given for a stage that the set already has.
     StageError
         When a stage of your own raises an error, or a stage returns what the next one can't use. The message says
         which stage, where it is written, at which frame, and what is probably wrong.
@@ -173,9 +175,31 @@ def run_pipeline(
         if not isinstance(frame, Frame):
             raise ArgumentError("frames", "the frames of a drive", repr(frame)[:100])
         if running is None:
-            complete = Stages.completed(stages, frame.camera, memory, occupancy=occupancy, crf=crf, seed=seed)
-            running = complete.started()
+            running = _completed(stages, frame.camera, occupancy, crf, seed, memory).started()
         yield run_frame(frame, running)
+
+
+def _completed(
+    stages: Stages | SemanticGridNet,
+    camera: Camera,
+    occupancy: CmcdotParams | None,
+    crf: CrfParams | None,
+    seed: int,
+    memory: bool | MemoryParams,
+) -> Stages:
+    """Fill what a set leaves out by the package's fast stages. Parameters are those of `run_pipeline`."""
+    if isinstance(stages, SemanticGridNet):
+        return Stages.fast(stages, occupancy, crf=crf, seed=seed, memory=memory)
+    options = {"occupancy": ("track", occupancy), "seed": ("track", seed or None)}
+    options |= {"crf": ("refine", crf), "memory": ("remember", memory or None)}
+    for name, (stage, value) in options.items():
+        if value is not None and stage in stages.given:
+            raise ArgumentError(name, f"nothing, because the set has a stage `{stage}` already", value)
+    if not set(STAGES) <= set(stages.given):
+        stages = stages.over(Stages.fast(load_net(sample_weights(), camera), occupancy, crf=crf, seed=seed))
+    if memory is not False:
+        stages = replace(stages, remember=class_memory(memory, stages.architecture or Architecture()))
+    return stages
 
 
 def network_image(frame: Frame, size: tuple[int, int]) -> NDArray[np.float32]:

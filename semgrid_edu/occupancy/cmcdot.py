@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.errors import check_seconds
+from semgrid_edu.errors import ArgumentError, check_seconds
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up, map_around, scroll, turn_moments
@@ -296,7 +296,15 @@ def motion_since(before: Frame | None, now: Frame) -> tuple[PlanarMotion, float]
         The earlier frame; None when `now` is the first: then nothing moves, and the time is `LIDAR_PERIOD`.
     now : Frame
         The later frame.
+
+    Raises
+    ------
+    ArgumentError
+        When time runs backwards.
     """
     if before is None:
         return PlanarMotion(), LIDAR_PERIOD
-    return PlanarMotion.from_poses(before.T_world_from_lidar, now.T_world_from_lidar), now.time - before.time
+    dt = now.time - before.time
+    if dt < 0:
+        raise ArgumentError("frames", "frames in the order of time, and a new tracker for each drive", f"{dt:.4g} s")
+    return PlanarMotion.from_poses(before.T_world_from_lidar, now.T_world_from_lidar), dt

@@ -2,6 +2,6 @@
 
 from semgrid_edu.stages.checks import StageError
 from semgrid_edu.stages.hints import REMEMBER, STAGES
-from semgrid_edu.stages.stages import Stages
+from semgrid_edu.stages.stages import Stages, class_memory
 
-__all__ = ["REMEMBER", "STAGES", "StageError", "Stages"]
+__all__ = ["REMEMBER", "STAGES", "StageError", "Stages", "class_memory"]

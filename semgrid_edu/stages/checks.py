@@ -1,6 +1,6 @@
 """Checks of what one stage hands to the next; the error says which stage, where, and what is probably wrong."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -32,22 +32,21 @@ class CheckedStage:
         The stage, the package's own or yours.
     shape : tuple of int
         Shape that the result must have.
+    check : callable
+        `check(self, result)` rejects what the next stage can't use: `finite`, `distribution`, ...
     first_frame : int
         Number of the frame of the first call, for messages; each call counts one on.
-    of_probabilities : bool
-        Whether the result of `sample` must be class probabilities.
     """
 
     def __init__(
-        self, name: str, stage: Any, shape: tuple[int, ...], first_frame: int = 0, of_probabilities: bool = False
+        self, name: str, stage: Any, shape: tuple[int, ...], check: Callable[..., None], first_frame: int = 0
     ) -> None:
         self.name = name
         self.stage = stage
-        self.__wrapped__ = stage  # so that `inspect.signature` gives the stage's own
-        self.of_probabilities = of_probabilities
         self.shape = shape
+        self.check = check
         self.frame = first_frame - 1
-        self.is_ours = str(getattr(stage, "__module__", None)).startswith("semgrid_edu.")
+        self.is_ours = is_ours(stage)
 
     def __str__(self) -> str:
         """Say which stage, where it is written, and at which frame: "refine (my_stages.py, line 12), frame 3"."""
@@ -71,16 +70,8 @@ class CheckedStage:
         with self.blamed():
             value = self.stage(*given)
         result = self.array(value, self.shape)
-        if self.name == "segment":
-            self.finite(result)
-        elif self.of_probabilities and not (result.min() >= -TOLERANCE and result.max() <= 1 + TOLERANCE):
-            found = f"{result.min():.4g} to {result.max():.4g}: sample the soft-max of s over axis 0"
-            raise self.error("class probabilities, because the network uses return heights", found)
-        elif self.name == "fuse":
-            self.log_probabilities(result, inputs[0])
-        elif self.name == "refine":
-            self.probabilities(result, "classes")
-        return result  # the planes hold too many numbers to search them at each frame: see `log_probabilities`
+        self.check(self, result)
+        return result
 
     def error(self, expected: object, found: object) -> StageError:
         """Return an error that names this stage and this frame.
@@ -123,55 +114,84 @@ class CheckedStage:
         with np.errstate(over="ignore"):  # what is too large becomes infinite, which is rejected next
             return value.astype(np.float32, order="K", copy=not self.is_ours)
 
-    def finite(self, values: NDArray) -> None:
-        """Reject NaN and infinity.
 
-        Parameters
-        ----------
-        values : array
-            What the stage returned.
-        """
-        if not np.isfinite(values).all():
-            place = _first(~np.isfinite(values))
-            raise self.error("finite numbers", f"{values[place]} at index {place}")
+def is_ours(stage: object) -> bool:
+    """Return whether a stage is the package's own.
 
-    def probabilities(self, values: NDArray, axis: str) -> None:
-        """Reject values that aren't a distribution in each cell.
+    Parameters
+    ----------
+    stage : callable or Tracker
+        The stage.
+    """
+    return str(getattr(stage, "__module__", None)).startswith("semgrid_edu.")
 
-        Parameters
-        ----------
-        values : (K, H, W) float32
-            What the stage returned.
-        axis : str
-            What the first axis holds: "classes" or "states".
-        """
-        cell, total = _wrong_sum(values)
-        if cell is not None:
-            found = f"that the {len(values)} {axis} of cell {cell} sum to {total:.4g}: {sum_hint(values, total, axis)}"
-            raise self.error("probabilities that sum to 1 in each cell", found)
-        if values.min() < -TOLERANCE:
-            cell = _first((values < -TOLERANCE).any(axis=0))
-            raise self.error("probabilities from 0 to 1", f"{values[:, *cell].min():.4g} in cell {cell}")
 
-    def log_probabilities(self, values: NDArray, planes: NDArray) -> None:
-        """Reject values that aren't logarithms of a distribution over the classes in each cell.
+def finite(stage: CheckedStage, values: NDArray) -> None:
+    """Reject NaN and infinity.
 
-        Parameters
-        ----------
-        values : (C, H, W) float32
-            What the stage `fuse` returned, natural logarithms.
-        planes : (C, D, H, W) float32
-            What it was given. If these aren't finite, the stage `sample` is to blame.
-        """
-        with np.errstate(over="ignore"):
-            cell, total = _wrong_sum(np.exp(values))
-        if cell is not None:
-            if not np.isfinite(planes).all():
-                place = _first(~np.isfinite(planes))
-                raise self.error("finite numbers from `sample`", f"{planes[place]} at index {place}")
-            found = f"that exp of the {len(values)} classes of cell {cell} sums to {total:.4g}"
-            wanted = "log-probabilities, whose exp sums to 1 in each cell"
-            raise self.error(wanted, f"{found}: {log_sum_hint(values, total)}")
+    Parameters
+    ----------
+    stage : CheckedStage
+        The stage, for its error; the other checks have it too.
+    values : array
+        What the stage returned.
+    """
+    if not np.isfinite(values).all():
+        place = _first(~np.isfinite(values))
+        raise stage.error("finite numbers", f"{values[place]} at index {place}")
+
+
+def class_probabilities(stage: CheckedStage, values: NDArray) -> None:
+    """Reject planes that hold anything but probabilities, such as raw scores.
+
+    Parameters
+    ----------
+    stage, values
+        Those of `finite`.
+    """
+    least, most = values.min(), values.max()
+    if not (least >= -TOLERANCE and most <= 1 + TOLERANCE):  # true for NaN as well
+        found = f"{least:.4g} to {most:.4g}: sample the soft-max of s over axis 0"
+        raise stage.error("class probabilities, because the network uses return heights", found)
+
+
+def distribution(stage: CheckedStage, values: NDArray, axis: str = "classes") -> None:
+    """Reject values that aren't a distribution in each cell.
+
+    Parameters
+    ----------
+    stage, values
+        Those of `finite`; the values are (K, H, W).
+    axis : str
+        What the first axis holds: "classes" or "states".
+    """
+    cell, total = _wrong_sum(values)
+    if cell is not None:
+        found = f"that the {len(values)} {axis} of cell {cell} sum to {total:.4g}: {sum_hint(values, total, axis)}"
+        raise stage.error("probabilities that sum to 1 in each cell", found)
+    if values.min() < -TOLERANCE:
+        cell = _first((values < -TOLERANCE).any(axis=0))
+        raise stage.error("probabilities from 0 to 1", f"{values[:, *cell].min():.4g} in cell {cell}")
+
+
+def log_distribution(stage: CheckedStage, values: NDArray) -> None:
+    """Reject values that aren't logarithms of a distribution over the classes in each cell.
+
+    Parameters
+    ----------
+    stage, values
+        Those of `finite`; the values are (C, H, W).
+    """
+    with np.errstate(over="ignore"):
+        cell, total = _wrong_sum(np.exp(values))
+    if cell is not None:
+        found = f"that exp of the {len(values)} classes of cell {cell} sums to {total:.4g}"
+        wanted = "log-probabilities, whose exp sums to 1 in each cell"
+        raise stage.error(wanted, f"{found}: {log_sum_hint(values, total)}")
+
+
+def unsearched(stage: CheckedStage, values: NDArray) -> None:
+    """Accept everything. Parameters are those of `finite`."""
 
 
 def _first(wrong: NDArray) -> tuple[int, ...]:

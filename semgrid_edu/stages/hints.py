@@ -46,7 +46,7 @@ def check_usage(name: str, stage: object, takes: tuple[str, ...]) -> None:
     """
     usage = f"a function {name}({', '.join(takes)})"
     if "spec" in takes:
-        usage += " or an object with step(frame)"
+        usage += f" or an object with step({takes[0][:-1]})"
     if isinstance(stage, type):
         raise ArgumentError(name, usage, f"the class {stage.__name__} itself: write {name} = {stage.__name__}(...)")
     if "spec" in takes and hasattr(stage, "step"):

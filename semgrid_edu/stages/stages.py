@@ -15,14 +15,12 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from semgrid_edu.camera import Camera
 from semgrid_edu.crf import CrfParams, mean_field
-from semgrid_edu.datasets.samples import sample_weights
 from semgrid_edu.errors import ArgumentError, MissingExtraError
 from semgrid_edu.frame import Frame
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.memory import ClassMemory, MemoryParams
-from semgrid_edu.networks import Architecture, SemanticGridNet, load_net
+from semgrid_edu.networks import Architecture, SemanticGridNet
 from semgrid_edu.occupancy import CmcdotParams, DriveTracker
 from semgrid_edu.planes import cell_heights
 from semgrid_edu.stages.hints import REMEMBER, STAGES, check_usage
@@ -196,38 +194,13 @@ class Stages:
         ArgumentError
             When both have an architecture and the two differ in what stages hand to each other.
         """
-        if self.architecture and self.architecture.layout != other.architecture.layout:
-            raise ArgumentError("architecture", f"that of the other stages, {other.architecture}", self.architecture)
+        theirs = other.architecture or Architecture()
+        if self.architecture and self.architecture.layout != theirs.layout:
+            raise ArgumentError("architecture", f"that of the other stages, {theirs}", self.architecture)
         filled = {name: getattr(self, name) for name in self.given}
         if self.fuse is not None:
             filled["return_heights"] = self.return_heights
         return replace(other, **filled)
-
-    @classmethod
-    def completed(
-        cls,
-        stages: "Stages | SemanticGridNet",
-        camera: Camera,
-        memory: bool | MemoryParams = False,
-        **options: Any,
-    ) -> "Stages":
-        """Return a complete set for a drive: the package's fast stages fill the gaps.
-
-        Parameters
-        ----------
-        stages : Stages or SemanticGridNet
-            The stages that are given, or a network. Without `segment`, `sample` or `fuse` the shipped SegNet does
-            these three.
-        camera : Camera
-            The camera as it took the images of the drive.
-        memory, **options
-            Those of `Stages.of`.
-        """
-        if isinstance(stages, SemanticGridNet):
-            return cls.fast(stages, memory=memory, **options)
-        if set(STAGES) <= set(stages.given) and memory is False:
-            return stages
-        return stages.over(cls.fast(load_net(sample_weights(), camera), memory=memory, **options))
 
     def need_ready(self) -> None:
         """Raise an `ArgumentError` unless `run_frame` can run these stages: all five, and no generator among them."""
@@ -243,10 +216,12 @@ class Stages:
             raise ArgumentError("stages", f"all of {', '.join(STAGES)}", f"no {', '.join(sorted(missing))}")
 
     def started(self) -> "Stages":
-        """Return the stages for one drive: with fresh copies of tracker and memory, and with their results checked."""
+        """Return the stages for one drive: tracker and memory are copies, and all results are checked.
+
+        The copies know what the originals know: start each drive from a set that has seen no frame.
+        """
         self._need_all()
         architecture = self.architecture or Architecture()
-        # Copies, so that the next drive starts with the tracker and the memory as they were given.
         own = replace(self, track=copy.deepcopy(self.track), remember=copy.deepcopy(self.remember))
         parts = {name: checked(name, getattr(own, name), architecture) for name in own.given}
         return replace(self, architecture=architecture, **parts)
@@ -273,7 +248,7 @@ def network_stages(net: SemanticGridNet, memory: bool | MemoryParams) -> Stages:
         sample=_on_arrays(net.sample),
         fuse=_on_arrays(fuse),
         architecture=architecture,
-        remember=_memory(memory, architecture),
+        remember=class_memory(memory, architecture),
         return_heights=return_heights if architecture.uses_return_heights else None,
     )
 
@@ -290,8 +265,21 @@ def _on_arrays(function: Callable) -> Callable:
     return stage
 
 
-def _memory(memory: bool | MemoryParams, architecture: Architecture) -> Tracker | None:
-    """Return the stage `remember`, or None without memory."""
+def class_memory(memory: bool | MemoryParams, architecture: Architecture) -> ClassMemory | None:
+    """Return the package's stage `remember`, or None without memory.
+
+    Parameters
+    ----------
+    memory : bool or MemoryParams
+        Whether classes are remembered, or the parameters with which they are.
+    architecture : Architecture
+        The grid and the classes.
+
+    Raises
+    ------
+    ArgumentError
+        When `memory` is neither, or the label set has no unknown classes.
+    """
     if memory is False:
         return None
     if not isinstance(memory, bool | MemoryParams):

@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.networks import Architecture
 from semgrid_edu.occupancy import N_STATES, Belief
-from semgrid_edu.stages.checks import CheckedStage
+from semgrid_edu.stages.checks import (
+    CheckedStage,
+    class_probabilities,
+    distribution,
+    finite,
+    is_ours,
+    log_distribution,
+    unsearched,
+)
 
 
 def checked(name: str, stage: Any, architecture: Architecture) -> CheckedStage:
@@ -32,14 +40,16 @@ def checked(name: str, stage: Any, architecture: Architecture) -> CheckedStage:
         return CheckedTracker(name, stage, (N_STATES, *spec.shape), spec)
     if name == "remember":
         return CheckedMemory(name, stage, (n_classes, *spec.shape), spec)
-    shapes = {
-        "segment": (n_classes, *architecture.image_size),
-        "sample": (n_classes, len(architecture.heights), *spec.shape),
-        "fuse": (n_classes, *spec.shape),
-        "refine": (n_classes, *spec.shape),
-    }
-    of_probabilities = name == "sample" and architecture.uses_return_heights
-    return CheckedStage(name, stage, shapes[name], of_probabilities=of_probabilities)
+    if name == "segment":
+        return CheckedStage(name, stage, (n_classes, *architecture.image_size), finite)
+    if name == "sample":
+        shape = (n_classes, len(architecture.heights), *spec.shape)
+        if architecture.uses_return_heights:
+            return CheckedStage(name, stage, shape, class_probabilities)
+        # Planes hold millions of numbers: ours aren't searched, because finite scores give finite planes.
+        return CheckedStage(name, stage, shape, unsearched if is_ours(stage) else finite)
+    check = log_distribution if name == "fuse" else distribution
+    return CheckedStage(name, stage, (n_classes, *spec.shape), check)
 
 
 class CheckedTracker(CheckedStage):
@@ -56,7 +66,7 @@ class CheckedTracker(CheckedStage):
     yields = "belief"
 
     def __init__(self, name: str, stage: Any, shape: tuple[int, ...], spec: object) -> None:
-        super().__init__(name, stage, shape)
+        super().__init__(name, stage, shape, distribution)
         self.stepped = stage if hasattr(stage, "step") else SteppedGenerator(self, stage, spec)
 
     def step(self, frame: Any) -> Any:
@@ -102,7 +112,7 @@ class CheckedTracker(CheckedStage):
             value = Belief(value, unknown[0], unknown)
         shapes = {"probability": self.shape, "velocity": (2, *grid), "velocity_covariance": (2, 2, *grid)}
         arrays = {name: self.array(getattr(value, name), shape) for name, shape in shapes.items()}
-        self.probabilities(arrays["probability"], "states")
+        self.check(self, arrays["probability"], "states")
         return replace(value, **arrays)
 
 
@@ -118,7 +128,7 @@ class CheckedMemory(CheckedTracker):
     def result(self, value: object) -> NDArray[np.float32]:
         """Return a grid of class probabilities. Parameters are those of `CheckedTracker.result`."""
         remembered = self.array(value, self.shape)
-        self.probabilities(remembered, "classes")
+        self.check(self, remembered)
         return remembered
 
 

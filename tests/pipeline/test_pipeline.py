@@ -181,3 +181,24 @@ def test_a_frame_without_image_is_refused(drive, net):
     blind = Frame(None, frame.points, frame.camera, frame.T_world_from_lidar, frame.time)
     with pytest.raises(ArgumentError, match="camera image"):
         next(run_pipeline([blind], net, occupancy=FEW))
+
+
+def test_a_memory_is_added_to_a_complete_set(drive, net):
+    (result,) = run_pipeline(drive[:1], Stages.fast(net, FEW), memory=True)
+    (expected,) = run_pipeline(drive[:1], Stages.fast(net, FEW, memory=True))
+    np.testing.assert_array_equal(result.remembered, expected.remembered)
+
+
+@pytest.mark.parametrize("option", [{"occupancy": FEW}, {"crf": CrfParams()}, {"seed": 3}, {"memory": True}])
+def test_a_parameter_of_a_stage_that_the_set_has_is_refused(drive, net, option):
+    own = Stages.fast(net, FEW, memory=True)
+    with pytest.raises(ArgumentError, match=rf"^{next(iter(option))}: expected nothing, because the set has a stage"):
+        next(run_pipeline(drive, own, **option))
+
+
+def test_a_tracker_that_has_seen_a_drive_does_not_start_another(drive, net):
+    stages = Stages.fast(net, FEW)
+    for frame in drive:
+        run_frame(frame, stages)
+    with pytest.raises(ArgumentError, match=r"^frames: expected frames in the order of time, and a new tracker"):
+        next(run_pipeline(drive, stages))

@@ -17,7 +17,7 @@ from semgrid_edu.fast import mean_field
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.networks import SemanticGridNet, unit_image
 from semgrid_edu.occupancy import N_STATES
-from semgrid_edu.stages.checks import CheckedStage
+from semgrid_edu.stages.checks import CheckedStage, distribution
 from semgrid_edu.workshop.scoring.counting import Grids
 from semgrid_edu.workshop.scoring.flat_ground import (
     Labeller,
@@ -69,7 +69,7 @@ def network_grids(net: SemanticGridNet, frames: TrainingSet, refinements: Mappin
         log_g = learned_log_g(net, sample)
         found = {NETWORK: np.exp(log_g)}
         for name, refine in (refinements or {}).items():
-            checked = CheckedStage("refine", refine, log_g.shape, first_frame=k)
+            checked = CheckedStage("refine", refine, log_g.shape, distribution, first_frame=k)
             found[f"{NETWORK} + {name}"] = checked(log_g, sample.occupancy.numpy())
         return found
 
