@@ -2,13 +2,12 @@
 
 import os
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
+from tiny_notes import wait_for
 
 from semgrid_edu.datasets import KittiRawDrive, load_index
 from semgrid_edu.datasets.kitti_raw import drive_folder
@@ -103,27 +102,10 @@ if __name__ == "__main__":
     script = tmp_path / "run.py"
     script.write_text(code)
     variables = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    process = subprocess.Popen([sys.executable, script], cwd=tmp_path, env=variables, start_new_session=True)
-    while not ((tmp_path / "one").exists() and (tmp_path / "other").exists()):
-        assert process.poll() is None
-        time.sleep(0.05)
+    process = subprocess.Popen([sys.executable, script], cwd=tmp_path, env=variables, stdout=subprocess.PIPE)
+    wait_for(lambda: (tmp_path / "one").exists() and (tmp_path / "other").exists())
     process.kill()
-    process.wait()
-    for _ in range(200):
-        if not group_alive(process.pid):
-            return
-        time.sleep(0.05)
-    os.killpg(process.pid, signal.SIGKILL)
-    pytest.fail("workers were still running ten seconds after their parent was killed")
-
-
-def group_alive(group: int) -> bool:
-    """Whether any process of a process group is still running."""
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return False
-    return True
+    process.communicate(timeout=10)  # workers have the same output, which ends when all of them have ended
 
 
 def test_the_index_lists_the_labelled_frames(made):
