@@ -32,7 +32,6 @@ OXTS = f"{DRIVE}/oxts/data/000000000{{}}.txt"
 PHOTO = f"{DRIVE}/image_02/data/0000000000.png"
 CALIBRATION = f"TINY/{DATE}/calib_cam_to_cam.txt"
 HUGE = str(2**70)
-DEEP, LONG_NUMBER = "[" * 10**5, '{"a": ' + "9" * 5000 + "}"
 
 DEMO = f"demo --kitti TINY --date {DATE} --drive 0001 --out OUT"
 TRAIN = "train --data TINY --out OUT"
@@ -75,25 +74,12 @@ def a_foreign_database(path: Path) -> None:
         database.commit()
 
 
-def change(name: str, old: str, new: str) -> Spoil:
-    def spoil(root: Path) -> None:
-        content = (root / name).read_text()
-        assert old in content
-        (root / name).write_text(content.replace(old, new))
-
-    return spoil
-
-
 def cut(name: str, share: float) -> Spoil:
     def spoil(root: Path) -> None:
         content = (root / name).read_bytes()
         (root / name).write_bytes(content[: int(len(content) * share) // 16 * 16])
 
     return spoil
-
-
-def shorter(name: str) -> Spoil:
-    return lambda root: (root / name).write_text("".join((root / name).read_text().splitlines(keepends=True)[:-1]))
 
 
 def gone(name: str) -> Spoil:
@@ -137,13 +123,9 @@ def a_socket(name: str) -> Spoil:
     return spoil
 
 
-def scan(points: np.ndarray, k: int = 0) -> Spoil:
-    return lambda root: (root / SCAN.format(k)).write_bytes(np.asarray(points, "<f4").tobytes())
-
-
 def one_point(root: Path) -> None:
     for k in range(3):
-        scan(np.array([[5.0, 0, 0, 0]]), k)(root)
+        (root / SCAN.format(k)).write_bytes(np.array([5.0, 0, 0, 0], "<f4").tobytes())
 
 
 def packet(field: int, value: str, k: int = 1) -> Spoil:
@@ -247,54 +229,15 @@ def png(name: str, size: tuple[int, int], mode: str = "RGB", value: int = 0, for
     return lambda root: Image.new(mode, size, value).save(root / name, form)
 
 
-NAN = np.array([[5.0, np.nan, 0, 0]] * 700)
-FAR = np.array([[5000.0, 0, 0, 0]] * 700)
-
 DRIVES = (
     Row("a scan that is a pipe", DEMO, "0000.bin: expected a file, found a pipe", pipe(SCAN.format(0))),
     Row("a scan that is a socket", DEMO, "0000.bin: expected a file, found a pipe, a socket", a_socket(SCAN.format(0))),
     Row("a scan that is a folder", DEMO, "0000.bin: expected a file, found a folder", folder(SCAN.format(0))),
     Row("a missing scan", DEMO, "doubtful: .*0000.bin: expected a scan, found none", gone(SCAN.format(0))),
-    Row("an empty scan", DEMO, "0000.bin: expected a file with content", text(SCAN.format(0), "")),
-    Row(
-        "a scan of a broken number of bytes", DEMO, "0000.bin: expected points of 4 x 4", text(SCAN.format(0), "x" * 17)
-    ),
-    Row(
-        "only damaged scans, to be left out",
-        f"{DEMO} --skip-damaged --frames 0:1",
-        "0000.bin: expected points of 4 x 4",
-        text(SCAN.format(0), "\0" * 17),
-    ),
-    Row("a scan with NaN", DEMO, "0000.bin: expected finite coordinates", scan(NAN)),
-    Row("a return at five kilometres", DEMO, "0000.bin: expected finite coordinates within 250 m", scan(FAR)),
-    Row(
-        "a scan cut in half", DEMO, "doubtful: .*0000.bin: .* as large as the drive's others", cut(SCAN.format(0), 0.5)
-    ),
     Row("scans of one point", DEMO, "doubtful: .*0000.bin: expected a scan of at least 100 points, found 1", one_point),
-    Row("a pose 4000 km away", DEMO, "doubtful: .*0001.txt: expected a place within", packet(0, "85.0")),
-    Row("a height that jumps", DEMO, "doubtful: .*0001.txt: expected a place within", packet(2, "9000.0")),
-    Row("a latitude of 91 degrees", DEMO, "0000.txt: expected latitude", packet(0, "91.0", 0)),
     Row("a yaw in degrees", DEMO, "0000.txt: expected roll, pitch and yaw", packet(5, "180.0", 0)),
-    Row("an oxts packet with a word in it", DEMO, "0000.txt: expected numbers", packet(3, "north", 0)),
-    Row("an oxts packet of NaN", DEMO, "0000.txt: expected finite numbers", packet(3, "nan", 0)),
-    Row("an oxts packet of 29 numbers", DEMO, "0000.txt: expected 30 numbers", packet(3, "", 0)),
-    Row("a missing oxts packet", DEMO, "0000.txt: expected a file", gone(OXTS.format(0))),
-    Row("a missing image", DEMO, "0000.png: expected a file", gone(PHOTO)),
-    Row("an image cut short", DEMO, "0000.png: expected a sound PNG", cut(PHOTO, 0.5)),
-    Row("an image of another size", DEMO, "0000.png: expected RGB of 12 x 40", png(PHOTO, (30, 20))),
-    Row("a grey image", DEMO, "0000.png: expected RGB of 12 x 40", png(PHOTO, (40, 12), "L")),
     Row("a JPEG called PNG", DEMO, "0000.png: expected a sound PNG", png(PHOTO, (40, 12), form="jpeg")),
-    Row("missing time stamps", DEMO, "timestamps.txt: expected a file", gone(f"{DRIVE}/oxts/timestamps.txt")),
-    Row("a time stamp too few", DEMO, "timestamps.txt: expected 3 lines", shorter(f"{DRIVE}/image_02/timestamps.txt")),
-    Row(
-        "time stamps in words",
-        DEMO,
-        "timestamps.txt: expected times",
-        text(f"{DRIVE}/oxts/timestamps.txt", "now\n" * 3),
-    ),
     Row("time stamps not in ASCII", DEMO, "timestamps.txt: expected ASCII", text(f"{DRIVE}/oxts/timestamps.txt", "é")),
-    Row("no calibration", DEMO, "calib_cam_to_cam.txt: expected a file", gone(CALIBRATION)),
-    Row("a calibration without its matrix", DEMO, "calib_cam_to_cam.txt: expected", change(CALIBRATION, "P_rect", "Q")),
     Row("a calibration that is a pipe", DEMO, "calib_cam_to_cam.txt: expected a file", pipe(CALIBRATION)),
     Row(
         "a drive that isn't there", DEMO.replace("0001", "0042"), "0042_sync: expected a folder, found only the drives"
@@ -331,69 +274,18 @@ DRIVES = (
 
 INDEXES = (
     Row("no index", TRAIN, "dataset.json: expected a file", gone("TINY/dataset.json")),
-    Row(
-        "an index that is no JSON",
-        TRAIN,
-        "dataset.json: expected a JSON object, found no JSON",
-        text("TINY/dataset.json", "{"),
-    ),
-    Row("an index nested 100,000 deep", TRAIN, "dataset.json: .*nested too deeply", text("TINY/dataset.json", DEEP)),
-    Row(
-        "an index with a number of 5000 digits",
-        TRAIN,
-        "dataset.json: .*no JSON",
-        text("TINY/dataset.json", LONG_NUMBER),
-    ),
     Row("an index that is a list", TRAIN, "dataset.json: expected a JSON object", text("TINY/dataset.json", "[1]")),
-    Row(
-        "an index that isn't UTF-8",
-        TRAIN,
-        "dataset.json: ",
-        lambda r: (r / "TINY/dataset.json").write_bytes(b"\xff\xfe"),
-    ),
-    Row("an index that is a pipe", TRAIN, "dataset.json: expected a file", pipe("TINY/dataset.json")),
-    Row("an unknown label set", TRAIN, "dataset.json: expected label_set", index(label_set="COCO")),
-    Row("a label set that is a number", TRAIN, "dataset.json: expected label_set", index(label_set=14)),
-    Row(
-        "the label set of other labels",
-        TRAIN,
-        "dataset.json: expected the label set of 2026_01_01 000., KITTI-14, found SYNTHIA-10",
-        index(label_set="SYNTHIA-10"),
-    ),
-    Row("splits that are numbers", TRAIN, "dataset.json: expected splits", index(splits=3)),
-    Row("a split without frames", TRAIN, "dataset.json: expected splits", index(splits={"train": []})),
     Row(
         "no frames to train on",
         TRAIN,
         "dataset.json: expected the split train, found test",
         index(splits={"test": [{"date": DATE, "drive": "0007", "frame": 2}]}),
     ),
-    Row("a frame below 0", TRAIN, "dataset.json: expected a frame like", frames(frame=-1)),
     Row("a frame of 26 digits", TRAIN, "dataset.json: expected a frame like", frames(frame=10**25)),
     Row("a name that is a list", TRAIN, "dataset.json: expected name", index(name=["tiny"])),
-    Row("a frame that is a word", TRAIN, "dataset.json: expected a frame like", frames(frame="two")),
-    Row("a drive outside of the data set", TRAIN, "dataset.json: expected a frame like", frames(drive="../../x")),
     Row("a drive that isn't there, in an index", TRAIN, "0042_sync: expected a folder", frames(drive="0042")),
     Row("a frame beyond the drive", TRAIN, "the frame 7 that dataset.json lists, found", frames(frame=7)),
     Row("a frame without labels", TRAIN, "expected labels of the frame 0", frames(frame=0)),
-    Row(
-        "labels of an unknown set",
-        TRAIN,
-        "label_set.txt: expected one of",
-        text(f"{DRIVE}/labels/label_set.txt", "COCO"),
-    ),
-    Row(
-        "labels of classes that aren't there",
-        TRAIN,
-        "birdseye.*expected classes 0 to 13",
-        png(f"{DRIVE}/labels/birdseye/0000000002.png", (310, 710), "L", 99),
-    ),
-    Row(
-        "a frame that lacks one of its labels",
-        TRAIN,
-        "depth/0000000002.png: expected a file",
-        gone(f"{DRIVE}/labels/depth/0000000002.png"),
-    ),
     Row("a scan cut in half, in a data set", EVALUATE, "doubtful: .*0000.bin", cut(SCAN.format(0), 0.5)),
     Row("a pose 4000 km away, in a data set", TRAIN, "doubtful: .*0001.txt", packet(0, "85.0")),
 )
@@ -460,8 +352,6 @@ WEIGHTS = (
     Row("a header with a size of words", EVALUATE, "weights.safetensors: .*header", header(image_size=["a", "b"])),
     Row("a header of an unknown network", EVALUATE, "weights.safetensors: .*header", header(segmenter="vit")),
     Row("a header of another network", EVALUATE, "weights.safetensors: expected", header(segmenter="fcn")),
-    Row("a header nested 100,000 deep", EVALUATE, "weights.safetensors: .*nested too deeply", raw_header(DEEP)),
-    Row("a header with a number of 5000 digits", EVALUATE, "weights.safetensors: .*no JSON", raw_header(LONG_NUMBER)),
     Row("a header that is a list", EVALUATE, "weights.safetensors: .*a JSON object", raw_header("[]")),
     Row(
         "no header",
@@ -474,7 +364,7 @@ WEIGHTS = (
 RUNS = (
     Row(
         "a folder that holds a network",
-        TRAIN,
+        f"{UNPREPARED} --out OUT",
         "OUT: expected a folder without a trained",
         text("OUT/weights.safetensors", "x"),
     ),
@@ -492,22 +382,13 @@ RUNS = (
         checkpoint({"run": "[1]", "iteration": "1"}),
     ),
     Row(
-        "a checkpoint nested 100,000 deep",
-        f"{TRAIN} --resume",
-        "checkpoint.safetensors: .*nested too deeply",
-        checkpoint({"run": DEEP, "iteration": "1"}),
+        "a checkpoint of nothing", f"{TRAIN} --resume", "checkpoint.safetensors: expected a checkpoint", checkpoint({})
     ),
     Row(
         "a checkpoint of step -1",
         f"{TRAIN} --resume",
         "checkpoint.safetensors: expected a checkpoint",
         checkpoint({"run": "{}", "iteration": "-1"}),
-    ),
-    Row(
-        "a checkpoint of another run",
-        f"{TRAIN} --resume",
-        "resume: expected the run of",
-        checkpoint({"run": "{}", "iteration": "1"}),
     ),
     Row("a training run in its data set", TRAIN.replace("OUT", "TINY"), "TINY: expected .*, found a data set"),
     Row(
@@ -545,22 +426,10 @@ RUNS = (
         log(Step(0, "image", 0.1, 1.0), Step(2, "image", 0.1, 1.0), Step(1, "image", 0.1, 1.0)),
     ),
     Row(
-        "a log of two runs, mixed",
-        "curves RUN --out c.png",
-        "log.csv: expected step 1 in line 3",
-        log(Step(0, "image", 0.1, 1.0), Step(0, "image", 0.1, 1.0)),
-    ),
-    Row(
         "a log that goes back to images",
         "curves RUN --out c.png",
         "log.csv: .*image stage before the grid stage",
         log(Step(0, "grid", 0.1, 1.0), Step(1, "image", 0.1, 1.0)),
-    ),
-    Row(
-        "a log cut in a line",
-        "curves RUN --out c.png",
-        "log.csv: expected iteration",
-        text(f"RUN/{LOG}", "iteration,stage,learning_rate,loss\n0,im"),
     ),
     Row("a log that is a pipe", "curves RUN --out c.png", "log.csv: expected the log", pipe(f"RUN/{LOG}")),
     Row("no log", "curves SAMPLES --out c.png", "log.csv: expected the log"),
@@ -577,12 +446,6 @@ DATA = (
         "data make sample OUT",
         "OUT/sample: expected a folder that no other process",
         locked("OUT/sample"),
-    ),
-    Row(
-        "a damaged archive",
-        FETCH,
-        "2011_09_26_calib.zip: expected a sound zip archive",
-        text("OUT/archives/2011_09_26_calib.zip", "x"),
     ),
     Row("no workers", "data make sample OUT --workers 0", "--workers: expected at least one process"),
     Row(
@@ -602,18 +465,9 @@ DATA = (
         "simulation.json: expected data made with",
         text("OUT/sample/simulation.json", '{"seed": 5}'),
     ),
-    Row(
-        "a data set with a damaged mark",
-        "data make sample OUT",
-        "simulation.json: .*nested too deeply",
-        text("OUT/sample/simulation.json", DEEP),
-    ),
     Row("an empty folder's name", "data make sample ''", "argument 4: expected a value"),
     Row("no bag there", f"{FROM_BAG} NONE.bag OUT {TOPICS}", "NONE.bag: expected.*nothing"),
     Row("a drive in place of a bag", f"{FROM_BAG} TINY OUT {TOPICS}", "TINY: expected.*without metadata.yaml"),
-    Row(
-        "a LIDAR below the ground", f"{FROM_BAG} TINY OUT {TOPICS} --lidar-height -1", "--lidar-height: expected metres"
-    ),
     Row("an unknown archive", "data fetch nuscenes --drive 2011_09_26_0013 --folder OUT", "expected kitti or pandaset"),
     Row("a drive of scenes", "data fetch pandaset --drive 2011_09_26_0013", "--drive: expected no drive of PandaSet"),
     Row("a drive that is no date", "data fetch kitti --drive 13 --folder OUT", "drive: expected date and number"),
@@ -621,22 +475,10 @@ DATA = (
     Row("no samples", "data verify OUT", "OUT: expected folders of samples"),
     Row("a sample that was changed", "data verify SAMPLES", "file.txt: changed", text("SAMPLES/one/file.txt", "x")),
     Row(
-        "provenance that is a list",
-        "data verify SAMPLES",
-        "provenance.json: expected a JSON object",
-        text("SAMPLES/one/provenance.json", "[1]"),
-    ),
-    Row(
         "provenance with a number for its checksums",
         "data verify SAMPLES",
         "provenance.json: expected .*checksums",
         text("SAMPLES/one/provenance.json", '{"sha256": 1}'),
-    ),
-    Row(
-        "provenance nested 100,000 deep",
-        "data verify SAMPLES",
-        "provenance.json: .*nested too deeply",
-        text("SAMPLES/one/provenance.json", DEEP),
     ),
 )
 
@@ -820,10 +662,10 @@ REFUSED_FIRST = (
     Row("matrices in a folder", f"{EVALUATE} --confusions a.npz", "a.npz: .*found a folder", folder("a.npz")),
     Row("curves over one's own picture", "curves RUN --out c.png", f"{LOST} without --force", text("c.png", "x")),
     Row("curves over a pipe", "curves RUN --out c.png", "c.png: .*found a pipe", pipe("c.png")),
-    Row("a log of one's own", TRAIN, f"log.csv: {LOST}", text("OUT/log.csv", "day,hours")),
+    Row("a log of one's own", f"{UNPREPARED} --out OUT", f"log.csv: {LOST}", text("OUT/log.csv", "day,hours")),
     Row(
         "an image stage of one's own",
-        TRAIN,
+        f"{UNPREPARED} --out OUT",
         f"image_stage.safetensors: {LOST}",
         text("OUT/image_stage.safetensors", "x"),
     ),

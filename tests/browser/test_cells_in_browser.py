@@ -431,12 +431,6 @@ class TestZoom:
             label = KITTI_14.names[classes(shipped_frames[FRAME], "grid")[cell]]
             page.locator("#hover", has_text=re.compile(f"^{label}$")).wait_for()
 
-    def test_a_click_finds_its_cell(self, shipped, factor):
-        page = shipped(f"#{FRAME}/{self.CELL[0]}/{self.CELL[1]}")
-        told(page, self.CELL)
-        page.locator("#zoom").select_option(str(factor))
-        click(page, "refined", (self.CELL[0] + 5, self.CELL[1] - 4))
-
     def test_without_a_cell_the_road_ahead_is_in_view(self, shipped, factor):
         page = shipped("#0")
         page.locator("#zoom").select_option(str(factor))

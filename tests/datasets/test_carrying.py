@@ -15,24 +15,6 @@ def occupancy(*states):
     return np.eye(4)[list(states)].T[:, None]
 
 
-def test_labels_reach_the_cells_of_their_returns():
-    labels = np.array([[ROAD, CAR], [255, SKY]], np.uint8)
-    grid = carry_labels(labels, np.array([0, 1, 2, 3]), np.array([0, 1, 2, 3]), occupancy(1, 0, 2, 3))
-    assert grid.tolist() == [[ROAD, CAR, DYNAMIC, UNOBSERVED]]
-
-
-def test_what_stands_outvotes_the_ground():
-    labels = np.array([[ROAD, ROAD, CAR, WALK, WALK, ROAD]], np.uint8)
-    cells = np.array([0, 0, 0, 1, 1, 1])
-    assert carry_labels(labels, np.arange(6), cells, occupancy(0, 0)).tolist() == [[CAR, WALK]]
-
-
-def test_without_returns_everything_is_unknown():
-    nothing = np.array([], np.int32)
-    grid = carry_labels(np.zeros((2, 2), np.uint8), nothing, nothing, occupancy(0, 1, 2, 3))
-    assert grid.tolist() == [[FREE, STATIC, DYNAMIC, UNOBSERVED]]
-
-
 def test_places_outside_are_refused():
     for name, pixels, cells in (("pixels", [4], [0]), ("cells", [0], [1]), ("cells", [0], [-1])):
         with pytest.raises(ArgumentError, match=name):

@@ -10,7 +10,7 @@ from archive_server import serve
 from tiny_drive import DATE, write_tiny_drive
 
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import DataError
 from semgrid_edu.workshop.commands import fetch
 from semgrid_edu.workshop.commands import main as cli
 from semgrid_edu.workshop.commands.fetch import fetch_kitti, unpack_zip
@@ -160,12 +160,6 @@ class TestWithoutNetwork:
     def test_a_drive_that_there_is_not(self, tmp_path, archives):
         with serve(archives) as (source, _), pytest.raises(DataError, match="404 Not Found: is there such a drive"):
             fetch_kitti(tmp_path, f"{DATE}_0099", source)
-
-    def test_a_name_that_is_no_drive(self, tmp_path):
-        with pytest.raises(
-            ArgumentError, match="drive: expected date and number such as 2011_09_26_0013, found '0013'"
-        ):
-            fetch_kitti(tmp_path, "0013")
 
 
 class TestUnpacking:

@@ -34,26 +34,26 @@ def test_groups_frames_by_drive(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "content",
+    ("content", "expected"),
     [
-        "",
-        "{",
-        "[]",
-        {"name": "tiny"},
-        {**SOUND, "label_set": "KITTI-15"},
-        {**SOUND, "label_set": ["KITTI-14"]},
-        {**SOUND, "splits": [FRAME]},
-        {**SOUND, "splits": {"train": []}},
-        {**SOUND, "splits": {"train": [{"date": DATE, "drive": "0001"}]}},
-        {**SOUND, "splits": {"train": [{**FRAME, "frame": "9"}]}},
-        {**SOUND, "splits": {"train": [{**FRAME, "frame": -1}]}},
-        {**SOUND, "splits": {"train": [{**FRAME, "date": "../other"}]}},
-        {**SOUND, "splits": {"train": [FRAME, FRAME]}},
-        {**SOUND, "splits": {"train": [FRAME], "test": [{**FRAME, "frame": 8}]}},
+        ("", "a file with content"),
+        ("{", "a JSON object"),
+        ("[]", "a JSON object"),
+        ({"name": "tiny"}, "an object with the key 'label_set'"),
+        ({**SOUND, "label_set": "KITTI-15"}, "label_set: one of"),
+        ({**SOUND, "label_set": ["KITTI-14"]}, "label_set: one of"),
+        ({**SOUND, "splits": [FRAME]}, "splits: lists"),
+        ({**SOUND, "splits": {"train": []}}, "splits: lists"),
+        ({**SOUND, "splits": {"train": [{"date": DATE, "drive": "0001"}]}}, "an object with the key 'frame'"),
+        ({**SOUND, "splits": {"train": [{**FRAME, "frame": "9"}]}}, "a frame like"),
+        ({**SOUND, "splits": {"train": [{**FRAME, "frame": -1}]}}, "a frame like"),
+        ({**SOUND, "splits": {"train": [{**FRAME, "date": "../other"}]}}, "a frame like"),
+        ({**SOUND, "splits": {"train": [FRAME, FRAME]}}, "each frame of train once"),
+        ({**SOUND, "splits": {"train": [FRAME], "test": [{**FRAME, "frame": 8}]}}, "each drive in one split"),
     ],
 )
-def test_says_what_is_wrong(tmp_path, content):
-    with pytest.raises(DataError, match=r"dataset\.json: expected"):
+def test_says_what_is_wrong(tmp_path, content, expected):
+    with pytest.raises(DataError, match=rf"dataset\.json: expected {expected}"):
         load_index(write(tmp_path, content))
 
 

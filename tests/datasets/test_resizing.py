@@ -5,7 +5,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from semgrid_edu.camera import Camera, project
 from semgrid_edu.datasets.frames import resize_labels
 from semgrid_edu.frame import resize_image
 
@@ -40,15 +39,3 @@ def test_labels_invent_no_class_at_any_size(labels):
     resized = resize_labels(labels, (5, 3))
     assert resized.shape == (5, 3)
     assert np.isin(resized, labels).all()
-
-
-def test_a_point_keeps_its_spot_in_the_smaller_image():
-    # A white spot of one coarse pixel: its centre, in the small image, is where the resized camera sees it.
-    camera = Camera(np.array([[50.0, 0, 19.5], [0, 50.0, 11.5], [0, 0, 1]]), np.eye(4), (24, 40))
-    image = np.zeros((24, 40, 3), np.uint8)
-    image[8:12, 20:24] = 255
-    point = np.array([[(21.5 - 19.5) / 50, (9.5 - 11.5) / 50, 1.0]])
-    np.testing.assert_allclose(project(point, camera)[0], [[21.5, 9.5]])
-    small = resize_image(image, (6, 10))
-    ((v, u),) = np.argwhere(small[..., 0])
-    np.testing.assert_allclose(project(point, camera.resized((6, 10)))[0], [[u, v]])

@@ -139,16 +139,6 @@ class TestTrackingRun:
             np.testing.assert_allclose(frame.T_world_from_lidar, expected, atol=1e-6)
             expected[0, 3] += 1
 
-    @pytest.mark.parametrize("k", [0, 1, 3])
-    def test_a_scan_that_was_never_recorded_is_a_gap(self, tmp_path, k):
-        write_run(tmp_path, n_frames=4)
-        (tmp_path / f"training/velodyne/0009/{k:06d}.bin").unlink()
-        run = KittiTrackingRun(tmp_path, 9)
-        assert run.gaps == (k,)
-        assert [len(frame.points) for frame in run] == [int(j != k) for j in range(4)]
-        assert tuple(run[k].image[0, 0]) == (k, 2, 3)
-        assert run.problems() == []
-
     @pytest.mark.parametrize(
         ("file", "old", "new", "message"),
         [

@@ -224,12 +224,6 @@ def test_holms_own_procedure_by_hand():
     assert holm([], 0.05) == []
 
 
-def test_more_statements_need_stronger_evidence():
-    weak = Statement("", value(-0.2, -0.001), p=0.02)
-    assert verdict([weak], 3, DRIVES) == "not reproduced"
-    assert verdict([weak] + [Statement("", value(-0.1, 0.1), p=0.5)] * 7, 3, DRIVES) == "cannot tell"
-
-
 def test_true_claims_are_rarely_refuted_however_many_statements_they_have():
     """Eight statements whose true values lie exactly at their limits, from counts that vary by drive and by seed.
 

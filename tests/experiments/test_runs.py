@@ -11,20 +11,17 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from safetensors.torch import load_file
 from tiny_notes import Note, wait_for
 from tiny_runs import results, tiny_training_runs
 
 from semgrid_edu.datasets import training_cache
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import DataError
 from semgrid_edu.networks import WEIGHTS
-from semgrid_edu.storage.files import sole_writer
 from semgrid_edu.workshop.paper.experiments import EXPERIMENTS
 from semgrid_edu.workshop.paper.loop import claim_folder, execute_plan, run_one
 from semgrid_edu.workshop.paper.reproduce import Request, plan_table, reproduce
 from semgrid_edu.workshop.paper.run import estimate, left_to_do, with_needs
-from semgrid_edu.workshop.paper.scales import SCALES, scale_named
-from semgrid_edu.workshop.paper.variants import Variant
+from semgrid_edu.workshop.paper.scales import SCALES
 from semgrid_edu.workshop.workplace import Workplace, workplace
 
 A = Note("a")
@@ -84,13 +81,6 @@ def test_the_folder_of_another_run_is_refused(tmp_path):
     assert "DataError" in run_one(A, tmp_path)
 
 
-def test_a_file_in_place_of_the_runs_is_refused(tmp_path):
-    (tmp_path / "runs").touch()
-    request = Request(experiment="table3", scale="quick", runs=tmp_path / "runs", out=tmp_path / "out", workers=1)
-    with pytest.raises(ArgumentError, match="--runs"):
-        reproduce(request, lambda _: None)
-
-
 def test_the_estimate_adds_up_what_is_left(tmp_path):
     """Two steps of 30 s each."""
     plan = with_needs([D])
@@ -127,11 +117,6 @@ def test_names_tell_runs_apart_and_stages_are_shared(scale):
     assert sum(run.name.startswith("data-") for run in table1) == 1
 
 
-def test_an_unknown_scale_is_refused():
-    with pytest.raises(ArgumentError, match="quick, reduced, long, paper"):
-        scale_named("huge")
-
-
 @pytest.fixture(scope="module")
 def trained(tmp_path_factory):
     """Two tiny networks, trained without any interruption."""
@@ -147,18 +132,6 @@ def test_the_image_stage_is_trained_once_and_both_networks_start_from_it(trained
     assert len(list(trained.glob(f"grid-*/{WEIGHTS}"))) == 2
     names = sorted(path.name for path in trained.glob("grid-*"))
     assert names == ["grid-tiny-segnet-true-2+2-seed1", "grid-tiny-segnet-true-2planes-unbalanced-2+2-seed1"]
-
-
-def test_in_two_stages_the_image_network_stays_as_it_was(trained, tmp_path):
-    """End to end, the grid's loss changes it."""
-    usual, root = tiny_training_runs()[0], shutil.copytree(trained, tmp_path / "runs")
-    apart = replace(usual, variant=Variant(end_to_end=False))
-    assert execute_plan([apart], root, here()) == {}
-    first, two_stage, together = (load_file(run.folder(root) / WEIGHTS) for run in (usual.image_stage, apart, usual))
-    learnt = [name for name in first if name.startswith("segmenter.") and name.endswith("weight")]
-    assert apart.name != usual.name
-    assert all(first[name].equal(two_stage[name]) for name in learnt)
-    assert not any(first[name].equal(together[name]) for name in learnt)
 
 
 def test_what_is_deleted_is_made_again_only_for_a_run_that_reads_it(trained, tmp_path):
@@ -208,14 +181,3 @@ def test_a_killed_plan_goes_on_with_the_same_bytes(trained, tmp_path):
     assert not second.has_ended(root)
     assert execute_plan(with_needs(tiny_training_runs()), root, here()) == {}
     assert results(root) == results(trained)
-
-
-def test_two_commands_never_share_a_folder_of_runs(tmp_path):
-    request = Request(experiment="table3", scale="quick", runs=tmp_path / "runs", out=tmp_path / "out", workers=1)
-    with sole_writer(tmp_path / "runs"), pytest.raises(DataError, match="a folder that no other process writes to"):
-        reproduce(request, lambda _: None)
-
-
-def test_no_workers_are_refused():
-    with pytest.raises(ArgumentError, match="--workers"), workplace(0):
-        pass

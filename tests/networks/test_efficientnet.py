@@ -12,7 +12,7 @@ from sklearn.datasets import load_sample_images
 from semgrid_edu import errors
 from semgrid_edu.errors import DataError, MissingExtraError
 from semgrid_edu.networks import build_segmenter, imagenet, load_imagenet
-from semgrid_edu.networks.efficientnet import ConvBn, InvertedBottleneck, LiteEncoder, same_padding
+from semgrid_edu.networks.efficientnet import LiteEncoder
 from semgrid_edu.networks.imagenet import INSTALLED, imagenet_file
 
 
@@ -53,39 +53,6 @@ def test_photographs_get_their_classes(classify, photo, expected):
     square = Image.fromarray(load_sample_images().images[photo]).resize((320, 224)).crop((48, 0, 272, 224))
     image = torch.from_numpy(np.array(square)).permute(2, 0, 1)[None] / 255
     assert classify(image).argmax() == expected
-
-
-@pytest.mark.parametrize(
-    ("size", "kernel", "stride", "zeros"),
-    [
-        (224, 3, 2, (0, 1)),
-        (7, 3, 2, (1, 1)),
-        (8, 5, 2, (1, 2)),
-        (9, 5, 1, (2, 2)),
-        (1, 3, 2, (1, 1)),
-        (6, 1, 1, (0, 0)),
-    ],
-)
-def test_zeros_are_added_as_in_tensorflow(size, kernel, stride, zeros):
-    assert same_padding(size, kernel, stride) == zeros
-    assert (size + sum(zeros) - kernel) // stride + 1 == -(-size // stride)
-
-
-def test_a_strided_convolution_begins_at_the_first_cell():
-    """A kernel that takes the cell at its first corner leaves every second cell of an even axis: 0, 2, 4."""
-    layer = ConvBn(1, 1, 3, stride=2).eval()
-    with torch.no_grad():
-        layer.conv.weight.zero_()[0, 0, 0, 0] = (1 + 1e-3) ** 0.5  # what the normalisation divides by
-    cells = torch.arange(36.0).reshape(1, 1, 6, 6)
-    torch.testing.assert_close(layer(cells), cells[..., ::2, ::2])
-
-
-@pytest.mark.parametrize(("n_out", "stride", "adds"), [(4, 1, True), (4, 2, False), (6, 1, False)])
-def test_a_block_adds_its_input_where_shapes_are_equal(n_out, stride, adds):
-    block = InvertedBottleneck(4, n_out, 3, stride, 2).eval()
-    x = torch.rand(1, 4, 6, 6)
-    torch.nn.init.zeros_(block.project.conv.weight)
-    assert torch.equal(block(x), x if adds else torch.zeros(1, n_out, 6 // stride, 6 // stride))
 
 
 @pytest.mark.parametrize("size", [(96, 320), (375, 1242), (33, 47)])

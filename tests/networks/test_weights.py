@@ -1,7 +1,6 @@
 import json
 from dataclasses import replace
 
-import numpy as np
 import pytest
 import torch
 from safetensors.torch import load_file, save_file
@@ -45,15 +44,6 @@ def _rewrite(path, change_tensors=lambda t: t, header=None):
     save_file(change_tensors(load_file(path)), path, metadata=header)
 
 
-def test_weights_come_back_bit_for_bit(net, saved, camera):
-    loaded = load_net(saved, camera)
-    assert loaded.architecture == SMALL
-    assert not loaded.training
-    for name, tensor in net.state_dict().items():
-        assert torch.equal(tensor, loaded.state_dict()[name])
-    assert torch.equal(loaded(*_inputs(SMALL)), net(*_inputs(SMALL)))
-
-
 def test_half_the_space_holds_convolutions_to_three_digits_and_the_rest_exactly(net, saved, camera, tmp_path):
     for name, tensor in net.state_dict().items():
         if name.endswith("running_var"):
@@ -64,14 +54,6 @@ def test_half_the_space_holds_convolutions_to_three_digits_and_the_rest_exactly(
         assert tensor.dtype == net.state_dict()[name].dtype
         tolerance = {"rtol": 1e-3, "atol": 1e-7} if tensor.ndim > 1 else {"rtol": 0, "atol": 0}
         torch.testing.assert_close(tensor, net.state_dict()[name], **tolerance)
-
-
-def test_a_network_without_occupancy_comes_back_without(camera, tmp_path):
-    path = tmp_path / "blind.safetensors"
-    save_net(build_net(replace(SMALL, uses_occupancy=False), camera), path)
-    loaded = load_net(path, camera)
-    assert not loaded.architecture.uses_occupancy
-    assert not loaded.fusion.uses_occupancy
 
 
 def test_several_image_networks_come_back_and_their_scores_are_averaged(net, camera, tmp_path):
@@ -112,66 +94,26 @@ def test_shipped_networks_are_written_again_byte_for_byte(camera, tmp_path):
     assert sha256(tmp_path / "again.safetensors") == sha256(shipped)
 
 
-def test_the_same_weights_give_the_same_bytes(net, saved, tmp_path):
-    save_net(net, tmp_path / "again.safetensors")
-    assert (tmp_path / "again.safetensors").read_bytes() == saved.read_bytes()
-
-
-def test_the_planes_follow_the_camera(net, saved, camera):
-    shifted = replace(
-        camera, T_camera_from_lidar=camera.T_camera_from_lidar + np.array([[0, 0, 0, 0.5]] + [[0] * 4] * 3)
-    )
-    loaded = load_net(saved, shifted)
-    assert not torch.equal(loaded(*_inputs(SMALL)), net(*_inputs(SMALL)))
-
-
-@pytest.mark.parametrize("segmenter", SEGMENTERS)
-def test_weights_of_every_image_network_come_back(segmenter, camera, tmp_path):
-    architecture = replace(SMALL, segmenter=segmenter)
+@pytest.mark.parametrize(
+    "architecture",
+    [*(replace(SMALL, segmenter=name) for name in SEGMENTERS), replace(SMALL, uses_occupancy=False)],
+    ids=[*SEGMENTERS, "without occupancy"],
+)
+def test_weights_come_back_bit_for_bit(architecture, camera, tmp_path):
     net = build_net(architecture, camera, seed=3).eval()
     save_net(net, tmp_path / "net.safetensors")
     loaded = load_net(tmp_path / "net.safetensors", camera)
     assert loaded.architecture == architecture
+    assert not loaded.training
+    for name, tensor in net.state_dict().items():
+        assert torch.equal(tensor, loaded.state_dict()[name])
     assert torch.equal(loaded(*_inputs(SMALL)), net(*_inputs(SMALL)))
-
-
-def test_weights_of_another_image_network_are_refused(saved, camera):
-    _rewrite(saved, header={"architecture": json.dumps({**_header(SMALL), "segmenter": "fcn"})})
-    with pytest.raises(DataError, match=r"expected \(16,\) for segmenter.backbone.features.0.bias, found nothing"):
-        load_net(saved, camera)
-
-
-@pytest.mark.parametrize("segmenter", SEGMENTERS)
-def test_the_compact_network_fits_its_budget(segmenter, camera, tmp_path):
-    save_net(build_net(Architecture(segmenter), camera), tmp_path / "compact.safetensors")
-    # EfficientNet has its published size.
-    budget = 14e6 if segmenter == "efficientnet" else 3e6
-    assert (tmp_path / "compact.safetensors").stat().st_size <= budget
-
-
-def test_a_network_made_by_hand_is_not_saved(net, tmp_path):
-    by_hand = SemanticGridNet(net.segmenter, net.sampler, net.n_classes)
-    with pytest.raises(ArgumentError, match=r"net: expected a network of build_net.*without an architecture"):
-        save_net(by_hand, tmp_path / "net.safetensors")
-    assert not list(tmp_path.iterdir())
 
 
 def test_a_network_made_by_hand_is_saved_with_the_architecture_it_was_given(net, tmp_path, camera):
     by_hand = SemanticGridNet(net.segmenter, net.sampler, net.n_classes, seed=3, architecture=SMALL).eval()
     save_net(by_hand, tmp_path / "net.safetensors")
     assert torch.equal(load_net(tmp_path / "net.safetensors", camera)(*_inputs(SMALL)), net(*_inputs(SMALL)))
-
-
-def test_a_missing_file_is_named(tmp_path, camera):
-    with pytest.raises(DataError, match=r"nowhere.safetensors: expected a safetensors file, found no such file"):
-        load_net(tmp_path / "nowhere.safetensors", camera)
-
-
-@pytest.mark.parametrize("damage", [lambda b: b"", lambda b: b[: len(b) // 2], lambda b: b"\x80\x04pickle" + b])
-def test_a_damaged_file_is_named(saved, camera, damage):
-    saved.write_bytes(damage(saved.read_bytes()))
-    with pytest.raises(DataError, match=r"net.safetensors: expected a safetensors file"):
-        load_net(saved, camera)
 
 
 def test_weights_of_another_architecture_are_refused(saved, camera):
@@ -205,12 +147,9 @@ def test_a_missing_or_extra_tensor_is_refused(saved, camera):
 @pytest.mark.parametrize(
     "header",
     [
-        None,
         {"architecture": "no json"},
-        {"architecture": json.dumps({**_header(SMALL), "segmenter": "vit"})},
         {"architecture": json.dumps({**_header(SMALL), "more": 1})},
         {"architecture": json.dumps({**_header(SMALL), "heights": ["low"]})},
-        {"architecture": "[]"},
     ],
 )
 def test_a_header_of_another_program_is_refused(saved, camera, header):

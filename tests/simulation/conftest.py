@@ -14,12 +14,6 @@ def junction_drive() -> SimulatedDrive:
     return SimulatedDrive(5, 10, BUSY)
 
 
-@pytest.fixture
-def junction_drive_again() -> SimulatedDrive:
-    """A second drive with the arguments of `junction_drive`."""
-    return SimulatedDrive(5, 10, BUSY)
-
-
 @pytest.fixture(scope="session")
 def crowded_drives() -> list[SimulatedDrive]:
     """Three drives through crowded towns."""

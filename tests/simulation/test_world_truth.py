@@ -188,11 +188,3 @@ def test_every_kind_has_its_class_in_both_label_sets():
         assert KITTI_14.names[kitti[kind]] == ours
         assert SYNTHIA_10.names[synthia[kind]] == theirs
     assert kitti[255] == synthia[255] == 255
-
-
-def test_the_same_seed_gives_the_same_frame(junction_drive_again, last_frame):
-    again = junction_drive_again.frame(9, True)
-    assert np.array_equal(again.picture.image, last_frame.picture.image)
-    assert np.array_equal(again.points, last_frame.points)
-    assert np.array_equal(again.truth.visible, last_frame.truth.visible)
-    assert again.objects == last_frame.objects

@@ -6,13 +6,10 @@ import torch
 import torch.nn.functional as F
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from tiny_streets import CAMERA, SMALL, tiny_streets
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import IGNORE
-from semgrid_edu.networks import build_net
-from semgrid_edu.training import Objective, median_frequency_weights, weighted_cross_entropy
-from semgrid_edu.training.batches import draw_batch, grid_logits, image_scores
+from semgrid_edu.training import median_frequency_weights, weighted_cross_entropy
 from semgrid_edu.training.devices import open_fabric
 from semgrid_edu.training.loss import class_frequencies, cross_entropy_sums, process_loss
 
@@ -31,10 +28,6 @@ def test_frequencies_and_weights_by_hand():
 def test_unlabelled_cells_count_nowhere():
     maps = [np.array([0, 1, 1, 255, 255]), np.array([255, 0])]
     np.testing.assert_allclose(class_frequencies(maps, 2), [2 / 4, 2 / 3])
-
-
-def test_balanced_classes_weigh_the_same():
-    np.testing.assert_allclose(median_frequency_weights([np.arange(6) % 3], 3), 1)
 
 
 @pytest.mark.parametrize("wrong", [3, 254, -1])
@@ -95,18 +88,6 @@ def test_the_literal_loss_is_that_of_torch(maps):
     else:  # PyTorch divides 0 by 0
         assert math.isnan(expected)
         assert found == 0
-
-
-@pytest.mark.parametrize(("stage", "results"), [("image", image_scores), ("grid", grid_logits)])
-def test_the_objective_of_a_stage_is_the_loss_of_its_results(stage, results):
-    net, alpha = build_net(SMALL, CAMERA).eval(), torch.linspace(0.25, 4, 14)
-    batch = draw_batch(tiny_streets(), 3, 0.2, 1, seed=0)
-    truth = batch.frames.labels if stage == "image" else batch.frames.truth
-    truth[:, 1::3] = IGNORE
-    with torch.no_grad():
-        loss = process_loss(FABRIC, *Objective(net, stage, alpha)(batch))
-        expected = weighted_cross_entropy(results(net, batch), truth, alpha)
-    assert loss.item() == pytest.approx(expected, rel=1e-5)
 
 
 def test_a_loss_of_what_does_not_fit_is_refused():

@@ -10,9 +10,9 @@ from typer.testing import CliRunner
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.datasets.training_set import Sample
-from semgrid_edu.errors import ArgumentError, DataError
+from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
-from semgrid_edu.networks import SEGMENTERS, Architecture, build_net, load_net, save_net
+from semgrid_edu.networks import Architecture, build_net, load_net, save_net
 from semgrid_edu.networks.fcn import Fcn
 from semgrid_edu.storage.files import sha256, write_text
 from semgrid_edu.storage.provenance import provenance_problems
@@ -104,20 +104,6 @@ def test_a_network_gets_the_classes_of_its_data(monkeypatch, tmp_path):
     params = experiment.training_params("compact", 1)
     experiment.train_network(tmp_path / "minisynthia", tmp_path / "out", "segnet", params)
     assert built["net"].label_set == SYNTHIA_10.name
-
-
-@pytest.mark.parametrize("option", ["--seed=-1", "--iterations=0"])
-def test_numbers_that_cannot_be_are_refused(tmp_path, option):
-    result = CliRunner().invoke(app, ["train", "--data", str(tmp_path), "--out", str(tmp_path / "out"), option])
-    assert result.exit_code == 2
-    assert f"Invalid value for '{option.split('=')[0]}'" in result.output
-    assert not (tmp_path / "out").exists()
-
-
-def test_the_command_names_what_is_missing(tmp_path):
-    arguments = ["train", "--data", str(tmp_path / "nowhere"), "--out", str(tmp_path / "out")]
-    with pytest.raises(ValueError, match=r"nowhere.dataset.json"):
-        CliRunner().invoke(app, arguments, catch_exceptions=False)
 
 
 def test_a_paper_preset_is_the_papers():
@@ -215,48 +201,10 @@ def test_the_mean_of_several_networks_starts_from_them_and_only_its_fusion_learn
     assert provenance["from"] == [sha256(file) for file in files]
 
 
-def test_a_network_of_another_kind_is_no_start(monkeypatch, tmp_path):
-    monkeypatch.setattr(experiment.TrainingSet, "by_camera", one_camera)
-    save_net(build_net(Architecture("fcn"), _Noise.camera), tmp_path / "fcn.safetensors")
-    options = ["--data", str(tmp_path), "--out", str(tmp_path / "out"), "--from", str(tmp_path / "fcn.safetensors")]
-    with pytest.raises(DataError, match=r"fcn.safetensors: expected a network like the one to train"):
-        CliRunner().invoke(app, ["train", *options], catch_exceptions=False)
-
-
 def test_a_network_starts_from_one_kind_of_weights(tmp_path):
     params = experiment.training_params("compact", iterations=1)
     with pytest.raises(ArgumentError, match="--from: expected no network beside the ImageNet weights"):
         experiment.train_network(tmp_path, tmp_path, "segnet", params, imagenet=tmp_path / "a", start=tmp_path / "b")
-
-
-@pytest.mark.parametrize("name", ["weights.safetensors", "log.csv", "image_stage.safetensors"])
-def test_what_would_be_lost_is_refused_before_the_data_are_prepared(monkeypatch, tmp_path, name):
-    def prepared(*_, **__):
-        raise AssertionError("the data were prepared")
-
-    monkeypatch.setattr(experiment.TrainingSet, "by_camera", prepared)
-    write_text(tmp_path / "out" / name, "mine")
-    with pytest.raises(DataError, match="which would be lost"):
-        experiment.train_network(tmp_path, tmp_path / "out", "segnet", experiment.training_params("compact", 1))
-
-
-@pytest.mark.parametrize(
-    ("option", "message"),
-    [
-        (["--device", "cuda:99"], "--device: expected cpu or one of the"),
-        (["--truth", "guessed"], "--truth: expected one of true, lidar, no-cleanup"),
-        (["--preset", "huge"], "--preset: expected compact or paper, found 'huge'"),
-        (["--segmenter", "unknown"], f"name: expected one of {', '.join(SEGMENTERS)}"),
-        (["--imagenet", "nowhere.safetensors"], "nowhere.safetensors: expected a safetensors file"),
-    ],
-)
-def test_an_option_that_cannot_be_is_named(monkeypatch, tmp_path, option, message):
-    monkeypatch.setattr(experiment.TrainingSet, "by_camera", one_camera)
-    with pytest.raises(ValueError, match=message):
-        CliRunner().invoke(
-            app, ["train", "--data", str(tmp_path), "--out", str(tmp_path / "out"), *option], catch_exceptions=False
-        )
-    assert not (tmp_path / "out").exists()
 
 
 def test_curves_of_several_runs_are_in_one_picture(tmp_path):

@@ -72,11 +72,6 @@ def test_another_file_is_refused(path, content):
         read_log(path)
 
 
-def test_a_missing_log_is_named(tmp_path):
-    with pytest.raises(DataError, match=r"log.csv: expected the log of a training run, found no such file"):
-        read_log(tmp_path / "log.csv")
-
-
 def test_a_full_disk_is_named(path):
     hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
     resource.setrlimit(resource.RLIMIT_FSIZE, (path.stat().st_size, hard))
