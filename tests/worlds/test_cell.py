@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pyagrum_oracle import assert_oracle_agrees
 from worlds.lecture_02_cell import (
     cell_given,
     exact_cell,
@@ -93,11 +92,6 @@ def test_the_state_screens_the_past_off():
     assert not d_separated(model, "v3", "m2", given="z3")
 
 
-def test_pyagrum_agrees():
-    scans = read_scans(".. ##")
-    assert_oracle_agrees(one_cell(scans).model, cell_given(scans))
-
-
 @settings(deadline=None)
 @given(st.floats(0.1, 0.9), st.lists(st.tuples(*[st.floats(0.05, 1)] * 2), min_size=1, max_size=6))
 def test_log_odds_are_exact_within_their_bounds(prior, scans):
@@ -115,7 +109,3 @@ def test_the_bounds_hold_log_odds_back():
     odds = (3 / 7) ** 5
     assert exact[1] == pytest.approx(odds / (1 + odds), rel=1e-6)
     assert package_log_odds_cell(scans)[-1] == pytest.approx(0.12)
-
-
-def test_pyagrum_agrees_on_log_odds():
-    assert_oracle_agrees(one_log_odds_cell(read_scans(".#.#"), 0.2).model, {"z1": 1, "z2": 1, "z4": 1})

@@ -2,11 +2,9 @@
 
 import numpy as np
 import pytest
-from pyagrum_oracle import assert_oracle_agrees
 from worlds.lecture_00_street import CLASS_OF, SystemWorld
 from worlds.lecture_14_class_memory import (
     MemoryWorld,
-    StillStreet,
     class_over_time,
     exact_classes,
     factored_classes,
@@ -54,13 +52,6 @@ def test_a_product_of_frames_that_err_together_is_worse_than_forgetting_and_an_e
     assert losses == pytest.approx([price.weighted, price.independent])
 
 
-@pytest.mark.parametrize("repeats", [0.6, 0.8])
-def test_in_a_cell_that_stands_still_an_exponent_pays_back_most(repeats):
-    still, moving = (memory_price(MemoryWorld(3, repeats, street)) for street in (StillStreet(), SystemWorld()))
-    paid = [(one.forgotten - one.weighted) / (one.forgotten - one.exact) for one in (still, moving)]
-    assert paid[0] > 0.7 > 0.55 > paid[1]
-
-
 @pytest.mark.parametrize("frames", [2, 3, 4])
 def test_the_best_exponent_is_the_textbooks(frames):
     """Derived for Gaussian errors, it holds here within a few per cent up to r = 0.6."""
@@ -79,7 +70,3 @@ def test_errors_are_what_couples_the_frames_beyond_the_cells_content():
     assert not d_separated(model, "z0", "z1", given=("m0", "m1"))
     assert d_separated(model, "z0", "z1", given=("m0", "m1", "e0"))
     assert d_separated(model, "l0", "z1", given="m0")
-
-
-def test_pyagrum_agrees_on_the_memory():
-    assert_oracle_agrees(class_over_time(MemoryWorld(steps=3)).model, readings(*SEEN))

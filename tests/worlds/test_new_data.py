@@ -32,7 +32,7 @@ from worlds.lecture_13_scan_borders import depth_edges, edge_contrast, ring_by_r
 
 import semgrid_edu
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.samples import real_drive, sample_drive
+from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.fast import track_drive
 from semgrid_edu.frame import Frame
@@ -102,13 +102,6 @@ def test_a_scan_that_is_sorted_by_time_gives_the_borders_that_one_ring_by_ring_g
     assert ring_by_ring(by_time).tolist() == scan.reshape(-1, 3).tolist()
     np.testing.assert_allclose(depth_edges(by_time), depth_edges(scan.reshape(-1, 3)))
     assert len(depth_edges(by_time)) == 6
-
-
-def test_borders_name_the_turn_of_the_camera_on_the_real_street():
-    frames = real_drive()[::3]
-    for make, turn in ((list, 0), (FAULTS["camera turned"], TURN)):
-        contrast = np.mean([edge_contrast(frame, YAWS) for frame in make(frames)], axis=0)
-        assert YAWS[contrast.argmax()] == pytest.approx(turn, abs=0.25)
 
 
 def test_a_wall_tells_a_lidar_that_leans_from_a_street_that_slopes(frames):
