@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pyagrum_oracle import assert_oracle_agrees
 from worlds.lecture_02_beam import (
     BeamWorld,
     beam_beliefs,
     beam_likelihood,
     beam_over_cells,
-    occupied,
     range_state,
-    reflection,
 )  # fmt: skip
 from worlds.lecture_02_thick_walls import (
     count_rings,
@@ -26,7 +23,7 @@ from worlds.lecture_02_thick_walls import (
 )  # fmt: skip
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, why_dependent
+from semgrid_edu.graphical import d_separated, eliminate, why_dependent
 
 COARSE = [4.0, 4.6, 3.6, 4.2]
 """Four returns from a wall in the fifth of eight cells, with a noise of one cell."""
@@ -65,40 +62,9 @@ def test_the_graph_of_four_beams_is_the_sum_over_maps():
     np.testing.assert_allclose(found.table, exact_by_hand(world, COARSE), atol=1e-9)
 
 
-def test_the_definition_agrees_on_a_short_row():
-    world = BeamWorld(n_cells=3)
-    model, known = beam_over_cells(world, 2).model, known_ranges(world, [1.0, 1.4])
-    found = enumerate_marginals(model, world.cells, known).normalised().table
-    np.testing.assert_allclose(found, eliminate(model, world.cells, known).normalised().table, atol=1e-12)
-    np.testing.assert_allclose(occupied(eliminate(model, world.cells, known).normalised()), _marginals(found))
-
-
-def _marginals(table):
-    return [table.take(1, axis=k).sum() for k in range(table.ndim)]
-
-
-def test_the_numbers_of_the_docstring():
-    beliefs = beam_beliefs(BeamWorld(), COARSE)
-    assert beliefs.cell_by_cell[3, 5] == pytest.approx(0.57, abs=0.005)
-    assert beliefs.exact[3, 5] == pytest.approx(0.34, abs=0.005)
-
-
-def test_reflection_by_hand():
-    """Free, occupied: the first reflects in 0.01, the second in 0.99 * 0.9."""
-    table = reflection(BeamWorld(n_cells=2)).given(m1=0, m2=1).table
-    np.testing.assert_allclose(table, [0.01, 0.99 * 0.9, 0.99 * 0.1])
-
-
 def test_no_return_says_that_the_row_is_probably_free():
     world = BeamWorld(n_cells=2)
     np.testing.assert_allclose(beam_likelihood(world, None).table, [[0.99**2, 0.99 * 0.1], [0.1 * 0.99, 0.01]])
-
-
-def test_pyagrum_agrees():
-    world = BeamWorld(n_cells=5)
-    assert_oracle_agrees(beam_over_cells(world, 2).model, known_ranges(world, [2.0, 2.7]))
-    world = same_sensor(0.3, n_cells=4)
-    assert_oracle_agrees(scan_with_pose_error(world, 2).model, known_ranges(world, [2.0, 2.0]))
 
 
 def test_the_package_agrees_where_the_range_is_exact():

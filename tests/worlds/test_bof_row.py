@@ -5,14 +5,12 @@ from itertools import product
 
 import numpy as np
 import pytest
-from pyagrum_oracle import posteriors
 from worlds.lecture_03_bof import (
     AT_THE_EDGE,
     HEAD_ON,
     STANDING_OR_DRIVING,
     TOWARDS_A_FENCE,
     bof_beliefs,
-    bof_stage,
     expected_things,
     stands_or_drives,
 )  # fmt: skip
@@ -22,14 +20,13 @@ from worlds.lecture_03_row import (
     CellsInARow,
     exact_beliefs,
     hit_probability,
-    joint_belief,
     row_evidence,
     row_model,
 )  # fmt: skip
-from worlds.lecture_04_cmcdot import FORGETTING, LEFT_OR_RIGHT
+from worlds.lecture_04_cmcdot import FORGETTING
 
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.graphical import d_separated, eliminate, why_dependent
+from semgrid_edu.graphical import eliminate
 from semgrid_edu.metrics import total_variation
 from semgrid_edu.occupancy import SensorModel
 
@@ -68,19 +65,6 @@ def test_joint_inference_is_what_counting_histories_gives(world):
     np.testing.assert_allclose(exact_beliefs(world), beliefs_by_counting_histories(world), atol=1e-12)
 
 
-@pytest.mark.parametrize("world", [STANDING_OR_DRIVING, LEFT_OR_RIGHT])
-def test_joint_inference_is_pyagrums(world):
-    T = len(world.scans)
-    wanted, probability = posteriors(row_model(world), row_evidence(world, T))
-    assert probability > 0
-    for k in range(len(world.cells)):
-        np.testing.assert_allclose(exact_beliefs(world)[-1, k], wanted[f"m{k + 1},{T}"], atol=1e-9)
-
-
-def test_bof_is_exact_where_cells_stay_independent_and_arrivals_exclude_each_other():
-    assert bof_errors(AT_THE_EDGE).max() < 1e-9
-
-
 def test_bof_is_exact_for_one_moving_thing_that_nobody_sees():
     unseen = CellsInARow(({}, {"left": 0.5, "right": 0.4}, {}, {}), ("????",) * 3)
     assert bof_errors(unseen).max() < 1e-9
@@ -115,15 +99,6 @@ def test_the_small_graph_is_the_row_after_its_first_scan():
     for cell in (1, 2):
         posterior = eliminate(graph.model, f"m{cell},1", {"z1,1": 0, "z2,1": 1}).normalised().table
         assert posterior[0] == pytest.approx(exact[cell - 1, Cell.FREE], abs=1e-12)
-
-
-def test_before_the_scan_only_the_joint_distribution_tells_the_two_worlds_apart():
-    unseen = CellsInARow(STANDING_OR_DRIVING.cells, ("????",))
-    assert bof_errors(unseen).max() < 1e-9
-    joint = joint_belief(unseen, 1).sum("m3,1", "m4,1").table
-    assert joint[Cell.STATIC, Cell.RIGHT] == 0
-    assert joint[Cell.STATIC, Cell.FREE] == pytest.approx(0.5)
-    assert joint[Cell.FREE, Cell.RIGHT] == pytest.approx(0.5)
 
 
 def test_bof_adds_what_two_antecedents_send():
@@ -199,17 +174,6 @@ def test_a_scan_is_as_informative_as_the_sensor_model_says():
     passes, hits = read[Cell.STATIC] / read[Cell.FREE]
     assert hits == pytest.approx(sensor.p_hit_occupied / sensor.p_hit_free)
     assert passes == pytest.approx(sensor.p_pass_occupied / sensor.p_pass_free)
-
-
-def test_the_graph_says_which_cells_depend_on_each_other():
-    stage = bof_stage()
-    before = [f"m{k},0" for k in range(1, 5)]
-    assert why_dependent(stage.model, "m1,1", "m2,1") == ("m1,1", "m1,0", "m2,1")
-    assert d_separated(stage.model, "m1,1", "m2,1", given=before)
-    assert d_separated(stage.model, "m1,0", "m3,0")
-    assert why_dependent(stage.model, "m1,0", "m3,0", given="one2,1") == ("m1,0", "one2,1", "m3,0")
-    assert d_separated(stage.model, "m1,0", "m4,0", given=stage.observed) is False
-    assert d_separated(stage.model, "m1,1", "m4,1")
 
 
 def test_a_world_in_which_something_is_born_moving_is_refused():

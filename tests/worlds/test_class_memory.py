@@ -2,31 +2,18 @@
 
 import numpy as np
 import pytest
-from pyagrum_oracle import assert_oracle_agrees
 from worlds.lecture_00_street import CLASS_OF, SystemWorld
 from worlds.lecture_14_class_memory import (
     MemoryWorld,
-    StillStreet,
     class_over_time,
     exact_classes,
     factored_classes,
     frames_worth,
     loss_by_exponent,
     memory_price,
-    readings,
 )  # fmt: skip
 
-from semgrid_edu.graphical import d_separated, enumerate_marginals
-
-SEEN = [2, 2, 0], [1, 0, 0]
-
-
-@pytest.mark.parametrize("repeats", [0.0, 0.6, 1.0])
-def test_elimination_is_the_sum_over_everything(repeats):
-    world = MemoryWorld(repeats=repeats)
-    model = class_over_time(world).model
-    summed = enumerate_marginals(model, "m2", readings(*SEEN)).normalised().table @ CLASS_OF
-    np.testing.assert_allclose(exact_classes(world, *SEEN)[-1], summed, atol=1e-12)
+from semgrid_edu.graphical import d_separated
 
 
 def test_with_independent_frames_the_factored_filter_is_exact():
@@ -54,13 +41,6 @@ def test_a_product_of_frames_that_err_together_is_worse_than_forgetting_and_an_e
     assert losses == pytest.approx([price.weighted, price.independent])
 
 
-@pytest.mark.parametrize("repeats", [0.6, 0.8])
-def test_in_a_cell_that_stands_still_an_exponent_pays_back_most(repeats):
-    still, moving = (memory_price(MemoryWorld(3, repeats, street)) for street in (StillStreet(), SystemWorld()))
-    paid = [(one.forgotten - one.weighted) / (one.forgotten - one.exact) for one in (still, moving)]
-    assert paid[0] > 0.7 > 0.55 > paid[1]
-
-
 @pytest.mark.parametrize("frames", [2, 3, 4])
 def test_the_best_exponent_is_the_textbooks(frames):
     """Derived for Gaussian errors, it holds here within a few per cent up to r = 0.6."""
@@ -79,7 +59,3 @@ def test_errors_are_what_couples_the_frames_beyond_the_cells_content():
     assert not d_separated(model, "z0", "z1", given=("m0", "m1"))
     assert d_separated(model, "z0", "z1", given=("m0", "m1", "e0"))
     assert d_separated(model, "l0", "z1", given="m0")
-
-
-def test_pyagrum_agrees_on_the_memory():
-    assert_oracle_agrees(class_over_time(MemoryWorld(steps=3)).model, readings(*SEEN))

@@ -1,14 +1,12 @@
-"""Bayes on a line: filterpy, lecture 01 and brute force are the messages on the chain."""
+"""Bayes on a line: filterpy and lecture 01 are the messages on the chain."""
 
 import numpy as np
-import pytest
 from filterpy import discrete_bayes
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pyagrum_oracle import assert_oracle_agrees
 from worlds.lecture_01_line import bayes_on_a_line, filtered, smoothed
 
-from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, sum_product, why_dependent
+from semgrid_edu.graphical import eliminate
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 
 MOVED = np.array([0.1, 0.8, 0.1])
@@ -61,13 +59,6 @@ def test_forward_messages_are_lecture_01s_recursion():
     np.testing.assert_allclose(filtered(bayes_on_a_line(8), readings), expected, atol=1e-12)
 
 
-def test_by_hand_pole_then_pole():
-    """Lecture 01: 0.8 / 3.1 beside a pole, then 0.55 in cell 3."""
-    first, second = filtered(bayes_on_a_line(2), [1, 1])
-    assert first[3] == pytest.approx(0.8 / 3.1)
-    assert second[3] == pytest.approx(0.55, abs=0.005)
-
-
 @settings(deadline=None, max_examples=30)
 @given(READINGS)
 def test_backward_messages_smooth(readings):
@@ -75,37 +66,6 @@ def test_backward_messages_smooth(readings):
     known = dict(zip(stage.observed, readings, strict=True))
     for t, belief in enumerate(smoothed(stage, readings)):
         np.testing.assert_allclose(belief, eliminate(stage.model, f"n{t}", known).normalised().table, atol=1e-12)
-
-
-def test_smoothing_by_the_definition():
-    stage = bayes_on_a_line(3)
-    wanted = [
-        enumerate_marginals(stage.model, f"n{t}", {"z0": 1, "z1": 1, "z2": 0}).normalised().table for t in range(3)
-    ]
-    np.testing.assert_allclose(smoothed(stage, [1, 1, 0]), wanted, atol=1e-12)
-
-
-def test_a_backward_message_is_the_likelihood_of_later_readings():
-    """By hand: P(z1 = pole | n0) = sum over d of moved[d] P(pole | n0 + d)."""
-    stage = bayes_on_a_line(2)
-    backward = sum_product(stage.model, {"z0": 0, "z1": 1}).messages["P(n1 | n0)", "n0"]
-    later = sum(m * np.roll(P_POLE, -d) for d, m in enumerate(MOVED))
-    np.testing.assert_allclose(backward, later / later.sum(), atol=1e-12)
-
-
-def test_the_present_place_screens_the_past_off():
-    model = bayes_on_a_line(4).model
-    assert d_separated(model, ("n0", "z0"), ("n2", "z3"), given="n1")
-    assert why_dependent(model, "z0", "z2", given="z1") == ("z0", "n0", "n1", "n2", "z2")
-
-
-def test_no_edge_is_cut():
-    """A later reading is no deleted edge: the filter answers another question."""
-    assert (bayes_on_a_line().cut, bayes_on_a_line().dashed) == ((), [])
-
-
-def test_pyagrum_agrees():
-    assert_oracle_agrees(bayes_on_a_line(6).model, {"z0": 1, "z1": 0, "z3": 1, "z4": 1})
 
 
 def test_a_kernel_longer_than_the_ring_goes_round_it():

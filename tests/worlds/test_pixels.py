@@ -3,9 +3,7 @@
 from itertools import product
 
 import numpy as np
-from worlds.lecture_05_pixel_ray import RayWorld, cell_by_cell, exact_ray, pixel_ray
-
-from semgrid_edu.graphical import d_separated
+from worlds.lecture_05_pixel_ray import RayWorld, cell_by_cell, exact_ray
 
 
 def test_the_posterior_is_the_sum_over_all_streets():
@@ -20,20 +18,7 @@ def test_the_posterior_is_the_sum_over_all_streets():
     np.testing.assert_allclose(exact_ray(labels, world), by_hand, atol=1e-12)
 
 
-def test_perfect_pixels_tell_nothing_about_what_is_behind_the_first_car():
-    world = RayWorld(4, prior=0.2, right=1.0)
-    np.testing.assert_allclose(exact_ray([0, 1, 1, 1], world), [0, 1, 0.2, 0.2], atol=1e-12)
-    np.testing.assert_allclose(cell_by_cell([0, 1, 1, 1], world), [0, 1, 1, 1])
-
-
 def test_without_occlusion_there_is_one_cell_and_both_agree():
     for label in (0, 1):
         world = RayWorld(1, prior=0.3, right=0.8)
         np.testing.assert_allclose(exact_ray([label], world), cell_by_cell([label], world), atol=1e-12)
-
-
-def test_a_pixel_makes_the_cells_on_its_ray_depend_on_each_other():
-    model = pixel_ray().model
-    assert d_separated(model, "m1", "m3")
-    assert not d_separated(model, "m1", "m3", given=("a3",))
-    assert d_separated(model, "m4", "a3")
