@@ -24,7 +24,9 @@ def with_fast_sampler(net: SemanticGridNet) -> SemanticGridNet:
     book = net.sampler
     if isinstance(book, PlaneSampler):
         return net
-    return net.with_sampler(PlaneSampler(book.pixels, book.visible, book.image_size))
+    sampler = PlaneSampler(book.pixels, book.visible, book.image_size)
+    fast = SemanticGridNet(net.segmenter, sampler, net.n_classes, architecture=net.architecture, fusion=net.fusion)
+    return fast.train(net.training)
 
 
 def load_net(path: str | Path, camera: Camera) -> SemanticGridNet:

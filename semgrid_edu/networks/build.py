@@ -94,6 +94,5 @@ def with_mean_scores(nets: Sequence[SemanticGridNet]) -> SemanticGridNet:
         return first
     members = [member for net in nets for member in getattr(net.segmenter, "members", [net.segmenter])]
     architecture = replace(first.need_architecture(), n_segmenters=len(members))
-    joined = SemanticGridNet(MeanSegmenter(members), first.sampler, first.n_classes, architecture=architecture)
-    joined.fusion = first.fusion
-    return joined
+    segmenter = MeanSegmenter(members)
+    return SemanticGridNet(segmenter, first.sampler, first.n_classes, architecture=architecture, fusion=first.fusion)

@@ -22,7 +22,7 @@ MOST_SEGMENTERS = 9
 
 @dataclass(frozen=True)
 class Architecture:
-    """Everything that determines the shapes of a network's weights and the heights of its planes.
+    """Everything that a trained network's weights depend on: its layers, their sizes, and what they see.
 
     The camera isn't part of it: one trained network fits every calibration, because only its planes move.
 
@@ -125,6 +125,8 @@ class SemanticGridNet(nn.Module):
     architecture : Architecture, optional
         The description that the parts were built from; `build_net` passes it. A network without one can be used, but
         not saved or trained, because it couldn't be rebuilt.
+    fusion : Module, optional
+        The fusion network, (p, o) -> g; by default a fresh one for the architecture.
     """
 
     def __init__(
@@ -135,35 +137,20 @@ class SemanticGridNet(nn.Module):
         seed: int = 0,
         *,
         architecture: Architecture | None = None,
+        fusion: nn.Module | None = None,
     ) -> None:
         super().__init__()
         self.segmenter = segmenter
         self.sampler = sampler
         self.n_classes = n_classes
         self.architecture = architecture
-        n_scores = getattr(segmenter, "n_classes", n_classes)
         options = architecture or Architecture()
         self.uses_return_heights = options.uses_return_heights
-        if self.uses_return_heights:
-            if sampler.planes_shape[0] != len(options.heights):
-                raise ArgumentError("sampler", f"{len(options.heights)} planes", sampler.planes_shape[0])
-            self.fusion = ReturnsFusion(
-                n_scores,
-                options.heights,
-                options.grid.cell,
-                n_classes,
-                seed=seed,
-                uses_occupancy=options.uses_occupancy,
-            )
-        else:
-            self.fusion = FusionNet(
-                n_scores,
-                sampler.planes_shape[0],
-                n_classes,
-                n_reduced=N_REDUCED if options.reduces else None,
-                seed=seed,
-                uses_occupancy=options.uses_occupancy,
-            )
+        n_planes = sampler.planes_shape[0]
+        if self.uses_return_heights and n_planes != len(options.heights):
+            raise ArgumentError("sampler", f"{len(options.heights)} planes", n_planes)
+        n_scores = getattr(segmenter, "n_classes", n_classes)
+        self.fusion = _fresh_fusion(n_scores, n_planes, n_classes, options, seed) if fusion is None else fusion
 
     def need_architecture(self) -> Architecture:
         """Return the architecture, or raise an `ArgumentError`: without it a network can't be saved or trained."""
@@ -176,7 +163,6 @@ class SemanticGridNet(nn.Module):
         self,
         image: Tensor,
         occupancy: Tensor,
-        mirrored: bool = False,
         sampler: PlaneSampler | None = None,
         return_heights: Tensor | None = None,
     ) -> NetOutputs:
@@ -188,10 +174,6 @@ class SemanticGridNet(nn.Module):
             RGB, 0..1.
         occupancy : (B, 4, H, W) float
             Probability of FREE, STATIC, DYNAMIC, UNKNOWN; they sum to 1 in each cell.
-        mirrored : bool
-            Whether the learnt parts see image and grid with left and right exchanged, as in half of the training
-            batches. Every result is mirrored back. The planes are always sampled unmirrored: the camera isn't quite
-            symmetric, so in a mirrored image equation (1) would give the wrong pixels.
         sampler : PlaneSampler, optional
             s -> p for the camera that took these images; the network's own sampler when left out.
         return_heights : (B, 2, H, W) float, optional
@@ -214,11 +196,11 @@ class SemanticGridNet(nn.Module):
             raise ArgumentError("occupancy", f"one for each of the {len(image)} images", len(occupancy))
         if self.uses_return_heights:
             self.check_return_heights(return_heights, len(image))  # before the image network, which takes longest
-        scores = self.segment(image, mirrored)
+        scores = self.segment(image)
         planes = self.sample(scores, sampler)
-        return NetOutputs(scores, planes, self.fuse(planes, occupancy, return_heights, mirrored))
+        return NetOutputs(scores, planes, self.fuse(planes, occupancy, return_heights))
 
-    def segment(self, image: Tensor, mirrored: bool = False) -> Tensor:
+    def segment(self, image: Tensor) -> Tensor:
         """Return s, the image network's scores. Parameters are those of `SemanticGridNet.stages`.
 
         Returns
@@ -226,7 +208,7 @@ class SemanticGridNet(nn.Module):
         (B, C, h, w) float
             One score per class and pixel, before any soft-max.
         """
-        return _flip(self.segmenter(_flip(image, mirrored)), mirrored)
+        return self.segmenter(image)
 
     def sample(self, scores: Tensor, sampler: PlaneSampler | None = None) -> Tensor:
         """Return p, the scores on the planes; with `uses_return_heights` the class probabilities, see `Architecture`.
@@ -242,11 +224,11 @@ class SemanticGridNet(nn.Module):
         -------
         (B, C, D, H, W) float
         """
-        return (sampler or self.sampler)(scores.softmax(dim=1) if self.uses_return_heights else scores)
+        if self.uses_return_heights:
+            scores = scores.softmax(dim=1)
+        return (sampler or self.sampler)(scores)
 
-    def fuse(
-        self, planes: Tensor, occupancy: Tensor, return_heights: Tensor | None = None, mirrored: bool = False
-    ) -> Tensor:
+    def fuse(self, planes: Tensor, occupancy: Tensor, return_heights: Tensor | None = None) -> Tensor:
         """Return the logits of the semantic grid from the sampled planes: (p, o) -> g.
 
         The other Parameters are those of `SemanticGridNet.stages`.
@@ -261,11 +243,9 @@ class SemanticGridNet(nn.Module):
         (B, C, H, W) float
             g before the soft-max.
         """
-        scan = (self.check_return_heights(return_heights, len(planes)),) if self.uses_return_heights else ()
-        # What reduces the planes sees one cell at a time, so we mirror after it, when there is less data to move.
-        reduced = _flip(self.fusion.reduce(planes, *scan), mirrored)
-        mirrored_scan = (_flip(part, mirrored) for part in (occupancy, *scan))
-        return _flip(self.fusion.fuse(reduced, *mirrored_scan), mirrored)
+        if self.uses_return_heights:
+            return self.fusion(planes, occupancy, self.check_return_heights(return_heights, len(planes)))
+        return self.fusion(planes, occupancy)
 
     def check_return_heights(self, return_heights: Tensor | None, n_frames: int) -> Tensor:
         """Return them in single precision, or raise an `ArgumentError` if they are missing or don't fit.
@@ -283,18 +263,6 @@ class SemanticGridNet(nn.Module):
             raise ArgumentError("return_heights", f"shape {expected}: the network uses return heights", found)
         return return_heights.float()
 
-    def with_sampler(self, sampler: nn.Module) -> "SemanticGridNet":
-        """Return a network of the same layers, which are shared, with another sampler.
-
-        Parameters
-        ----------
-        sampler : PlaneSampler
-            s -> p, with as many planes.
-        """
-        other = SemanticGridNet(self.segmenter, sampler, self.n_classes, architecture=self.architecture)
-        other.fusion = self.fusion
-        return other.train(self.training)
-
     def forward(self, image: Tensor, occupancy: Tensor, return_heights: Tensor | None = None) -> Tensor:
         """Return the logits of the semantic grid. Parameters and errors are those of `SemanticGridNet.stages`.
 
@@ -306,9 +274,13 @@ class SemanticGridNet(nn.Module):
         return self.stages(image, occupancy, return_heights=return_heights).logits
 
 
-def _flip(x: Tensor, mirrored: bool) -> Tensor:
-    """Exchange left and right of images or grids if `mirrored`."""
-    return x.flip(-1) if mirrored else x
+def _fresh_fusion(n_scores: int, n_planes: int, n_classes: int, options: Architecture, seed: int) -> nn.Module:
+    """Return the fusion network of an architecture with fresh weights."""
+    if options.uses_return_heights:
+        sizes = n_scores, options.heights, options.grid.cell, n_classes
+        return ReturnsFusion(*sizes, seed=seed, uses_occupancy=options.uses_occupancy)
+    n_reduced = N_REDUCED if options.reduces else None
+    return FusionNet(n_scores, n_planes, n_classes, n_reduced, seed, options.uses_occupancy)
 
 
 def _check(name: str, batch: Tensor, shape: tuple[int, ...]) -> None:

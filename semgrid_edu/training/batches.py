@@ -141,11 +141,15 @@ def image_scores(net: SemanticGridNet, batch: Batch) -> Tensor:
     (B, C, h, w) float32
         s, unmirrored.
     """
-    return net.segment(batch.frames.image, batch.mirrored)
+    return _flip(net.segment(_flip(batch.frames.image, batch.mirrored)), batch.mirrored)
 
 
 def grid_logits(net: SemanticGridNet, batch: Batch) -> Tensor:
     """Return the semantic grid of a batch before the soft-max. Parameters are those of `image_scores`.
+
+    Of a mirrored batch, what learns sees image and grid with left and right exchanged, and every result is mirrored
+    back. The planes are sampled unmirrored: the camera isn't quite symmetric, so in a mirrored image equation (1) would
+    give the wrong pixels.
 
     Returns
     -------
@@ -153,4 +157,16 @@ def grid_logits(net: SemanticGridNet, batch: Batch) -> Tensor:
         The logits, unmirrored.
     """
     frames = batch.frames
-    return net.stages(frames.image, frames.occupancy, batch.mirrored, batch.sampler, frames.return_heights).logits
+    scan = [frames.occupancy]
+    if net.uses_return_heights:
+        scan.append(frames.return_heights.float())
+    planes = net.sample(image_scores(net, batch), batch.sampler)
+    # What reduces the planes sees one cell at a time, so we mirror after it, when there is less data to move.
+    reduced = net.fusion.reduce(planes, *scan[1:])
+    mirrored_scan = [_flip(part, batch.mirrored) for part in scan]
+    return _flip(net.fusion.fuse(_flip(reduced, batch.mirrored), *mirrored_scan), batch.mirrored)
+
+
+def _flip(x: Tensor, mirrored: bool) -> Tensor:
+    """Exchange left and right of images or grids if `mirrored`."""
+    return x.flip(-1) if mirrored else x

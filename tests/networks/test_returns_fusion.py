@@ -6,12 +6,14 @@ import pytest
 import torch
 from safetensors import safe_open
 
+from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.fast import with_fast_sampler
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.networks import Architecture, build_net, save_net
+from semgrid_edu.networks import Architecture, SemanticGridNet, build_net, save_net
 from semgrid_edu.planes import above_ground, pick_planes
+from semgrid_edu.training.batches import Batch, grid_logits, image_scores
 
 GRID = GridSpec(2, 26, -6, 6, 1.0)
 SMALL = Architecture(image_size=(24, 80), grid=GRID, heights=(0.0, 0.5, 1.0), uses_return_heights=True)
@@ -66,10 +68,12 @@ def test_only_a_cell_in_view_with_a_return_must_have_a_name(net, inputs):
 
 def test_mirrored_it_sees_the_mirror_of_everything(net, inputs):
     image, occupancy, heights = inputs
-    seen = net.stages(image, occupancy, mirrored=True, return_heights=heights)
-    mirror = net.fusion(*(part.flip(-1) for part in (seen.planes, occupancy, heights)))
-    torch.testing.assert_close(seen.logits, mirror.flip(-1))
-    assert not torch.allclose(seen.logits, net(image, occupancy, heights))
+    batch = Batch(Sample(image, None, occupancy, None, return_heights=heights), mirrored=True)
+    logits = grid_logits(net, batch)
+    planes = net.sample(image_scores(net, batch))
+    mirror = net.fusion(*(part.flip(-1) for part in (planes, occupancy, heights)))
+    torch.testing.assert_close(logits, mirror.flip(-1))
+    assert not torch.allclose(logits, net(image, occupancy, heights))
 
 
 def test_every_input_matters_and_a_larger_image_score_alone_does_not(net, inputs):
@@ -118,7 +122,7 @@ def test_heights_in_double_precision_are_those_in_single_precision(net, inputs):
 def test_a_sampler_of_other_planes_is_refused(net, camera):
     other = build_net(replace(SMALL, heights=(0.0, 0.5)), camera).sampler
     with pytest.raises(ArgumentError, match="sampler: expected 3 planes, found 2"):
-        net.with_sampler(other)
+        SemanticGridNet(net.segmenter, other, net.n_classes, architecture=SMALL, fusion=net.fusion)
 
 
 def test_unreduced_planes_are_refused():

@@ -6,10 +6,12 @@ import torch
 import torch.nn.functional as F
 from torch import nn
 
+from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import SEGMENTERS, Architecture, FusionNet, SemanticGridNet, build_net, build_segmenter
 from semgrid_edu.occupancy import State
 from semgrid_edu.planes import PlaneSampler
+from semgrid_edu.training.batches import Batch, grid_logits, image_scores
 
 N_CLASSES = 5
 
@@ -58,11 +60,12 @@ def test_stages_follow_each_other(small_net, batch):
 
 def test_a_mirror_exchanges_left_and_right_for_the_learnt_parts_alone(small_net, batch):
     image, occupancy, _ = batch
-    seen = small_net.stages(image, occupancy, mirrored=True)
-    torch.testing.assert_close(seen.scores, small_net.segmenter(image.flip(-1)).flip(-1))
-    torch.testing.assert_close(seen.planes, small_net.sampler(seen.scores))
-    torch.testing.assert_close(seen.logits, small_net.fusion(seen.planes.flip(-1), occupancy.flip(-1)).flip(-1))
-    assert not torch.allclose(seen.logits, small_net(image, occupancy))
+    batch = Batch(Sample(image, None, occupancy, None), mirrored=True)
+    scores, logits = image_scores(small_net, batch), grid_logits(small_net, batch)
+    torch.testing.assert_close(scores, small_net.segmenter(image.flip(-1)).flip(-1))
+    planes = small_net.sampler(scores)
+    torch.testing.assert_close(logits, small_net.fusion(planes.flip(-1), occupancy.flip(-1)).flip(-1))
+    assert not torch.allclose(logits, small_net(image, occupancy))
 
 
 def test_frames_of_a_batch_do_not_touch(small_net, batch):
