@@ -66,12 +66,12 @@ def above_best(unary: NDArray[np.floating]) -> NDArray[np.floating]:
     return np.minimum(unary - unary.min(axis=0), NEVER).reshape(len(unary), -1)
 
 
-def settled(states: Iterator[NDArray], iterations: int, tolerance: float) -> NDArray:
+def settled(iterates: Iterator[NDArray], iterations: int, tolerance: float) -> NDArray:
     """Update until the number of updates is reached, or an update changes no probability by more than the tolerance.
 
     Parameters
     ----------
-    states : iterator of (C, H, W) float
+    iterates : iterator of (C, H, W) float
         Q at first and after each update, such as `mean_field_updates`.
     iterations : int
         The largest number of updates.
@@ -83,10 +83,10 @@ def settled(states: Iterator[NDArray], iterations: int, tolerance: float) -> NDA
     (C, H, W) float
         The last Q.
     """
-    Q = next(states)
+    Q = next(iterates)
     for _ in range(iterations):
         before = Q
-        Q = next(states)
+        Q = next(iterates)
         if np.abs(Q - before).max() <= tolerance:
             break
     return Q
@@ -116,8 +116,8 @@ def damping(self_coupling: NDArray) -> NDArray:
     Returns
     -------
     (N,) float
-        p_i, 0 < p_i <= 1. With the default parameters and many neighbours it is near 1, so damping costs nothing; with
-        `normalization="none"` it is 1 / (1 + (w1 + w2) / 2).
+        p_i, 0 < p_i <= 1; 1 is no damping. With many neighbours in the same state k_ii is small and p_i near 1, so
+        that damping costs little; with `normalization="none"` it is 1 / (1 + (w1 + w2) / 2).
     """
     return 1 / (1 + self_coupling / 2)
 
@@ -167,9 +167,9 @@ class SeparableGaussian:
     def __call__(self, values: NDArray[np.floating]) -> NDArray[np.float64]:
         """Return sum_j k_ij values_j, the cell itself included; one row per cell, (H W, K)."""
         height, width = len(self.rows), len(self.columns)
-        along_columns = self.rows @ values.reshape(height, -1)  # each row of the grid, with all its values, is a vector
-        along_rows = self.columns @ along_columns.reshape(height, width, -1)
-        return along_rows.reshape(values.shape)
+        summed = self.rows @ values.reshape(height, -1)  # over the rows of the grid, for each column and value
+        summed = self.columns @ summed.reshape(height, width, -1)  # over the columns
+        return summed.reshape(values.shape)
 
 
 def _between(size: int, sigma: float) -> NDArray[np.float64]:

@@ -1,7 +1,9 @@
 """The fast twins: the same public names as in the book, for commands, the demo and long runs.
 
-Nothing here is needed to understand a stage. Each twin is held equal to the book's version by a property test, and
-takes the same arguments; only `build_net` and `load_net` choose the sampler themselves. Where a docstring leaves its
+Nothing here is needed to understand a stage. Each twin is held equal to the book's version by a property test, and is
+called like it; `build_net` and `load_net` choose the sampler themselves, and filter and CRF hold their numbers in other
+arrays inside. Without a twin in the book: `fast_stages`, which is `Stages.fast`, and `with_fast_sampler`. `Cmcdot`
+takes `Walls`, but no subclass with rules of its own, which compiled loops can't call. Where a docstring leaves its
 parameters to `move`, say, it means the book's `move`. The compiled ones need numba, the extra `fast`:
 ``pip install semgrid_edu[fast]``.
 

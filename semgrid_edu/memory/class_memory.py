@@ -36,8 +36,8 @@ class MemoryParams:
     ----------
     near_exponent : float
         Exponent of the evidence of one more frame, for a cell next to the vehicle: 1 if frames were independent.
-        Measured on simulated drives other than the shipped one (`worth_by_distance`). For cells that the camera sees, a
-        smaller exponent would lower the log loss by at most 0.02 nats per cell.
+        Measured on simulated drives other than the shipped one (`worlds.lecture_14_gain`). For cells that the camera
+        sees, a smaller exponent would lower the log loss by at most 0.02 nats per cell.
     decay_distance : float
         Distance from the vehicle, metres, over which the exponent falls by a factor e, because far views are less
         reliable. Measured on the same drives.
@@ -252,7 +252,7 @@ def something_there(occupancy: NDArray) -> NDArray:
     Returns
     -------
     (...) float
-        The probability, at least 0.001, so that a mistaken FREE can be corrected later.
+        The probability, at least 0.001, so that its logarithm is finite.
     """
     o = np.asarray(occupancy)
     return np.maximum(o[State.STATIC] + o[State.DYNAMIC] + o[State.UNKNOWN] / 2, 1e-3)

@@ -219,6 +219,8 @@ def bof_velocity(state: BofState) -> tuple[NDArray[np.float32], NDArray[np.float
 class Bof:
     """The exact filter on a lattice of velocities: what `Cmcdot` tends to as its particles grow in number.
 
+    That holds up to the lattice's top speed and spacing: `Cmcdot` also follows what is faster.
+
     It has no randomness and no sampling error. The price is time and memory that grow with the number of velocities,
     in every cell, whether anything moves there or not. Its map scrolls under the vehicle as that of `Cmcdot` does.
 

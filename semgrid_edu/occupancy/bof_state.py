@@ -108,7 +108,7 @@ class VelocityLattice:
 
 
 MOST_BYTES = 2e9
-"""Memory that the mass of all velocities may take, in bytes; a step needs three times as much."""
+"""Memory that the mass of all velocities may take, in bytes; a step needs four times as much beside it."""
 
 
 @dataclass(frozen=True)

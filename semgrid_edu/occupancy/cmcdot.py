@@ -87,7 +87,8 @@ class Cmcdot:
         ------
         ArgumentError
             When the points aren't a table of finite coordinates, the time is negative or not finite, the sensor doesn't
-            turn the scan into evidence, or the resampling doesn't return indices. The state then stays as it was.
+            turn the scan into evidence, or the resampling doesn't return indices. The state then stays as it was;
+            random numbers may have been drawn.
         """
         check_seconds(dt)
         shift, pose = scroll(self._pose.then(motion), self.spec.cell)

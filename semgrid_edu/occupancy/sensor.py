@@ -332,8 +332,9 @@ class Scan:
 
     A beam is a narrow sector of azimuth. It is free up to its first obstacle or, when it has none, up to its farthest
     ground return. So all that beams tell about free space is one range per beam, its reach, in which each cell is
-    looked up. A cell with obstacle returns is occupied. A cell that its beam passes from end to end, or that holds a
-    ground return, is free. About all other cells, behind obstacles or out of range, the scan tells nothing.
+    looked up. A cell with obstacle returns is occupied. A cell whose beam sees half a cell or more past its centre, or
+    that holds a ground return, is free. About all other cells, behind obstacles or out of range, the scan tells
+    nothing.
 
     What this assumes:
 
@@ -376,7 +377,7 @@ class Scan:
         obstacles = count_in_cells(xy[obstacle], spec)
         ground = count_in_cells(xy[height < self.sensor.obstacle_min], spec)
         beyond = beyond_reach(self.reach, spec, pose)
-        passed = beyond <= -spec.cell / 2  # the beam leaves the cell on its far side
+        passed = beyond <= -spec.cell / 2  # the beam reaches half a cell past the centre
         # Just behind an obstacle, a beam may have come through below it.
         under = (beyond > spec.cell / 2) & (beyond < self.sensor.under)
         return likelihoods(obstacles, passed | ((ground > 0) & ~under), self.sensor)

@@ -35,7 +35,7 @@ class Belief:
         P(FREE), P(STATIC), P(DYNAMIC), P(UNKNOWN) of each cell; they sum to 1.
     velocity : (2, H, W) float32
         Mean velocity over ground of what moves in the cell, along the grid's x and y axes, m/s. NaN in cells without
-        dynamic mass, or with so little that no particle represents it.
+        dynamic mass, and where the map's cell has no particles.
     velocity_covariance : (2, 2, H, W) float32
         Covariance of that velocity along the same axes, m^2/s^2: how much it varies within the cell, and how uncertain
         it is. Symmetric and positive semi-definite; NaN where the velocity is NaN.
@@ -61,7 +61,8 @@ class Particles:
     velocity : (N, 2) float
         Velocity over ground along the axes of the map, m/s.
     weight : (N,) float
-        Probability that each particle carries. The dynamic probability of a cell is the sum of the weights in it.
+        Probability that each particle carries. The dynamic probability of a cell is the sum of the weights in it, and
+        what is newborn.
     """
 
     position: NDArray[np.floating]
@@ -273,7 +274,8 @@ class Resampling(Protocol):
 
     `resample` calls it twice per step: for the particles that continue, by their weights, and for the cells in which
     new ones appear, by their newborn mass. All that are drawn get the same weight afterwards. So index i should be
-    drawn count w_i / sum(w) times on average; otherwise the filter's probabilities are biased.
+    drawn count w_i / sum(w) times on average; otherwise the velocities are biased, and more dynamic mass becomes
+    UNKNOWN because no particle was drawn for it. (Elsewhere `resample` restores P(DYNAMIC), whatever is drawn.)
 
     Examples
     --------

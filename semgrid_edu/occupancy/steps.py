@@ -399,8 +399,9 @@ def bayes(prior: NDArray, evidence: Evidence) -> tuple[NDArray[np.float64], NDAr
     """
     # Only the ratio of the likelihoods counts. The larger becomes 1, because products of tiny numbers would vanish.
     best = np.maximum(evidence.occupied, evidence.free).astype(np.float64)
-    occupied = ratio(evidence.occupied, best)
-    free = ratio(evidence.free, best)
+    # Two zeros are equal as well, so they tell nothing: 1 and 1.
+    occupied = np.where(best > 0, ratio(evidence.occupied, best), 1)
+    free = np.where(best > 0, ratio(evidence.free, best), 1)
     joint = np.stack([free, occupied, occupied, free]) * prior
     p_z = joint.sum(axis=0)
     posterior = ratio(joint, p_z)

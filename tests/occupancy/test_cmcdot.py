@@ -163,7 +163,7 @@ def test_track_drive_takes_motion_and_time_from_the_frames():
 
 
 def test_track_drive_refuses_frames_out_of_order():
-    with pytest.raises(ArgumentError, match="dt"):
+    with pytest.raises(ArgumentError, match="frames in the order of time"):
         list(track_drive(frames(3)[::-1], SMALL, PARAMS))
 
 

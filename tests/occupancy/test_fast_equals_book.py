@@ -150,6 +150,18 @@ def test_update(state, evidence, first_sight, walls):
     assert_equal(fast.update(state, GRID, evidence, world), occupancy.update(state, GRID, evidence, world), 1e-4)
 
 
+@pytest.mark.parametrize("both", [0.0, 1e-30, 0.5])
+@TWINS
+@given(states())
+def test_where_both_likelihoods_are_equal_a_scan_tells_nothing(both, state):
+    evidence = Evidence(*np.full((2, *GRID.shape), both))
+    for update in (fast.update, occupancy.update):
+        updated = update(state, GRID, evidence, WorldModel(walls=None))
+        np.testing.assert_allclose(updated.probability, state.probability, atol=1e-6)
+        inside = cells_of(state.particles.position, GRID) >= 0
+        np.testing.assert_allclose(updated.particles.weight[inside], state.particles.weight[inside], rtol=1e-5)
+
+
 @TWINS
 @given(states(), st.sampled_from([1, 2, 3, 50, 500]), st.sampled_from([1e-9, 0.3, 0.9]), SEEDS)
 def test_resample(state, n_particles, birth_share, seed):

@@ -187,8 +187,8 @@ def bayes(prior, occupied, free):
     for r in range(prior.shape[1]):
         for c in range(prior.shape[2]):
             best = max(occupied[r, c], free[r, c])  # scale so that the better explanation is 1, however small both are
-            if_occupied = occupied[r, c] / best if best > 0 else 0.0
-            if_free = free[r, c] / best if best > 0 else 0.0
+            if_occupied = occupied[r, c] / best if best > 0 else 1.0  # two zeros are equal: nothing known
+            if_free = free[r, c] / best if best > 0 else 1.0
             empty = np.float64(prior[FREE, r, c]) + prior[UNKNOWN, r, c]
             full = np.float64(prior[STATIC, r, c]) + prior[DYNAMIC, r, c]
             evidence = if_free * empty + if_occupied * full

@@ -92,7 +92,7 @@ def learned_log_g(net: SemanticGridNet, sample: Sample) -> NDArray[np.float32]:
 
 
 def crf_refinement(cell: float) -> Refine:
-    """Return the fast CRF with the default parameters.
+    """Return the fast CRF with the parameters of `CrfParams.for_cells`.
 
     Parameters
     ----------
