@@ -340,13 +340,13 @@ def recall_classes(
     """
     check_shape("occupancy", occupancy, (N_STATES, *look.sees.shape))
     check_shape("places", places, look.sees.shape)
-    here = memory.at(places)
+    known = memory.at(places)
     movable = np.isin(np.arange(len(look.classes)), params.movable)
     # A remembered car is believed only as far as the LIDAR, a second witness, finds something.
-    here.evidence[:, movable] += np.log(something_there(occupancy))
-    evidence, weight, seen = _joined(here, look, np.ones((2, 1, 1)), params)
+    known.evidence[:, movable] += np.log(something_there(occupancy))
+    evidence, weight, seen = _joined(known, look, np.ones((2, 1, 1)), params)
     scores = np.maximum(weight, 1)[:, None] * evidence
-    belief = np.where((here.weight > 0)[:, None], _come_and_gone(scores, look, movable), look.classes)
+    belief = np.where((known.weight > 0)[:, None], _come_and_gone(scores, look, movable), look.classes)
 
     moving = occupancy[State.DYNAMIC]
     classes = (1 - moving) * seen[STAYS] * belief[STAYS] + moving * seen[MOVES] * belief[MOVES]
@@ -425,7 +425,7 @@ class ClassMemory:
         The memory after the last frame, over the cells of `map_spec`; None before the first.
     pose : PlanarMotion
         Pose of the vehicle in the map, metres and radians.
-    predicted, here : MemoryState, (H, W) int
+    predicted, places : MemoryState, (H, W) int
         The memory just before the last frame was added, and the number of the map's cell for each of the vehicle's.
     """
 
@@ -436,7 +436,7 @@ class ClassMemory:
         self.state: MemoryState | None = None
         self.pose = PlanarMotion()
         self.predicted: MemoryState | None = None
-        self.here: NDArray | None = None
+        self.places: NDArray | None = None
         self._last: Frame | None = None
 
     def step(self, view: View) -> NDArray:
@@ -484,8 +484,8 @@ class ClassMemory:
         velocity = np.einsum("ij,jhw->ihw", self.pose.rotation, values_at(belief.velocity, on_grid))
         self.predicted = carry_classes(moved, moving, velocity, self.spec.cell, dt, self.params)
         # Recall before learning: otherwise the frame would be counted twice.
-        self.here = places_of(self.spec, self.map_spec, self.pose)
-        recalled = recall_classes(self.predicted, self.here, belief.probability, look, self.params)
+        self.places = places_of(self.spec, self.map_spec, self.pose)
+        recalled = recall_classes(self.predicted, self.places, belief.probability, look, self.params)
         self.state = learn_classes(self.predicted, on_grid, look, self.params)
         return recalled
 

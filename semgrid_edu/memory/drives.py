@@ -55,12 +55,12 @@ def smooth_drive(views: Sequence[View], spec: GridSpec, params: MemoryParams | N
     for view in reversed(views):
         backward.step(_reversed_in_time(view))
         # What the later frames say, without this one. The list ends with the first frame, so `pop` gives them in order.
-        after.append(backward.predicted.at(backward.here))
+        after.append(backward.predicted.at(backward.places))
 
     forward = ClassMemory(spec, params)
     for view in views:
         forward.step(view)
-        both = _weighted_mean(forward.predicted.at(forward.here), after.pop(), params)
+        both = _weighted_mean(forward.predicted.at(forward.places), after.pop(), params)
         occupancy = view.belief.probability
         yield recall_classes(both, same_cells, occupancy, look_at(view.grid, occupancy, spec, params), params)
 

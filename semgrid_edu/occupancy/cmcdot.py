@@ -113,10 +113,10 @@ class Cmcdot:
         belief = local_belief(predicted.probability, velocity, in_grid, pose, map_spec, self.spec, self.params)
         if self.keep_steps:
             states = {"move": moved, "predict": predicted, "update": updated, "resample": resampled}
-            belief = replace(belief, steps={name: self._in_grid(state) for name, state in states.items()})
+            belief = replace(belief, steps={name: self._around_vehicle(state) for name, state in states.items()})
         return belief
 
-    def _in_grid(self, state: FilterState) -> NDArray[np.float32]:
+    def _around_vehicle(self, state: FilterState) -> NDArray[np.float32]:
         """Return the probabilities of a state of the map at the centres of the vehicle's own cells."""
         probability = state.probability.astype(np.float32)
         return look_up(probability, NOTHING_KNOWN, self.map_spec, self.spec, self._pose)

@@ -491,9 +491,8 @@ def likelihoods(obstacles: NDArray, free: NDArray, sensor: SensorModel) -> Evide
     >>> likelihoods(np.array([[1, 0, 0]]), np.array([[True, True, False]]), SensorModel()).free.round(2)
     array([[0.05, 0.7 , 1.  ]], dtype=float32)
     """
-    # A table with an entry for each outcome of a cell: 0 to max_returns hits, then "passed". Zero hits say nothing.
-    hits = np.arange(sensor.max_returns + 1)
-    outcome = np.where(free & (obstacles == 0), len(hits), np.minimum(obstacles, sensor.max_returns))
-    occupied = np.append(sensor.p_hit_occupied**hits, sensor.p_pass_occupied).astype(np.float32)
-    empty = np.append(sensor.p_hit_free**hits, sensor.p_pass_free).astype(np.float32)
-    return Evidence(occupied[outcome], empty[outcome])
+    hits = np.minimum(obstacles, sensor.max_returns)  # of zero hits both likelihoods are 1: they tell nothing
+    passed = free & (obstacles == 0)
+    occupied = np.where(passed, sensor.p_pass_occupied, sensor.p_hit_occupied**hits)
+    empty = np.where(passed, sensor.p_pass_free, sensor.p_hit_free**hits)
+    return Evidence(occupied.astype(np.float32), empty.astype(np.float32))

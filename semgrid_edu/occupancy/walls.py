@@ -150,19 +150,30 @@ class Walls:
             How long the particles have flown, seconds.
         """
         keeps = self.keeps_pace(particles.velocity, velocity_of(driven, dt), spec.cell)
-        before, shortly_before, ahead = (
-            self._other_cells(particles, cells, spec, fraction) for fraction in (-1, -self.second_look, 1)
-        )
-        # Suspicion: it comes out of a wall, or it would have driven through one shortly before.
+        suspicion = self._from_a_wall(particles, cells, mixed[STATIC], spec)
+        way_out = self._open_ahead(particles, cells, mixed, keeps, spec)
+        return suspicion * (1 - way_out) * at_cells(unseen, cells)
+
+    def _from_a_wall(self, particles: Particles, cells: NDArray, static: NDArray, spec: GridSpec) -> NDArray:
+        """Return the probability that a particle came out of a wall, or drove through one shortly before, (N,)."""
+        before = self._other_cells(particles, cells, spec, -1)
+        shortly_before = self._other_cells(particles, cells, spec, -self.second_look)
         runs = np.hypot(*particles.velocity.T) > self.running_speed
-        wall = mixed[STATIC] ** WALL_EXPONENT
-        nearby = largest_nearby(wall)
-        out_of_a_wall = np.where(runs, at_cells(nearby, before), at_cells(mixed[STATIC], before))
+        wall = static**WALL_EXPONENT
+        out_of_a_wall = np.where(runs, at_cells(largest_nearby(wall), before), at_cells(static, before))
         through_a_wall = runs * at_cells(wall, shortly_before)
-        # Acquittal: free or moving space ahead. A gap beside a hedge acquits nothing that keeps pace with the car.
-        beside_a_wall = keeps * at_cells(mixed[FREE] * largest_nearby(mixed[STATIC]), ahead)
-        open_ahead = at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - beside_a_wall
-        return np.maximum(out_of_a_wall, through_a_wall) * (1 - open_ahead) * at_cells(unseen, cells)
+        return np.maximum(out_of_a_wall, through_a_wall)
+
+    def _open_ahead(
+        self, particles: Particles, cells: NDArray, mixed: NDArray, keeps: NDArray[np.bool_], spec: GridSpec
+    ) -> NDArray:
+        """Return the probability that a particle will soon be in open space, (N,): where it is free, or things move.
+
+        A gap beside a hedge doesn't count for what keeps pace with the car.
+        """
+        ahead = self._other_cells(particles, cells, spec, 1)
+        gap = keeps * at_cells(mixed[FREE] * largest_nearby(mixed[STATIC]), ahead)
+        return at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - gap
 
     def clear_wakes(
         self, posterior: NDArray, particles: Particles, cells: NDArray, hidden: NDArray, spec: GridSpec
