@@ -149,31 +149,13 @@ class Walls:
         dt : float
             How long the particles have flown, seconds.
         """
-        keeps = self.keeps_pace(particles.velocity, velocity_of(driven, dt), spec.cell)
-        suspicion = self._from_a_wall(particles, cells, mixed[STATIC], spec)
-        way_out = self._open_ahead(particles, cells, mixed, keeps, spec)
-        return suspicion * (1 - way_out) * at_cells(unseen, cells)
-
-    def _from_a_wall(self, particles: Particles, cells: NDArray, static: NDArray, spec: GridSpec) -> NDArray:
-        """Return the probability that a particle came out of a wall, or drove through one shortly before, (N,)."""
-        before = self._other_cells(particles, cells, spec, -1)
-        shortly_before = self._other_cells(particles, cells, spec, -self.second_look)
         runs = np.hypot(*particles.velocity.T) > self.running_speed
-        wall = static**WALL_EXPONENT
-        out_of_a_wall = np.where(runs, at_cells(largest_nearby(wall), before), at_cells(static, before))
-        through_a_wall = runs * at_cells(wall, shortly_before)
-        return np.maximum(out_of_a_wall, through_a_wall)
-
-    def _open_ahead(
-        self, particles: Particles, cells: NDArray, mixed: NDArray, keeps: NDArray[np.bool_], spec: GridSpec
-    ) -> NDArray:
-        """Return the probability that a particle will soon be in open space, (N,): where it is free, or things move.
-
-        A gap beside a hedge doesn't count for what keeps pace with the car.
-        """
-        ahead = self._other_cells(particles, cells, spec, 1)
-        gap = keeps * at_cells(mixed[FREE] * largest_nearby(mixed[STATIC]), ahead)
-        return at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - gap
+        keeps = self.keeps_pace(particles.velocity, velocity_of(driven, dt), spec.cell)
+        before, shortly_before, ahead = (
+            self._other_cells(particles, cells, spec, fraction) for fraction in (-1, -self.second_look, 1)
+        )
+        suspicion = from_a_wall(mixed[STATIC], before, shortly_before, runs)
+        return suspicion * (1 - way_out(mixed, ahead, keeps)) * at_cells(unseen, cells)
 
     def clear_wakes(
         self, posterior: NDArray, particles: Particles, cells: NDArray, hidden: NDArray, spec: GridSpec
@@ -200,6 +182,40 @@ class Walls:
         """Return the cell of each particle at another time, (N,); `OUTSIDE` where it is the same cell as now."""
         then = cells_of(particles.position + self.displacement(particles.velocity, spec.cell, fraction), spec)
         return np.where(then == cells, OUTSIDE, then)
+
+
+def from_a_wall(static: NDArray, before: NDArray, shortly_before: NDArray, runs: NDArray) -> NDArray[np.float64]:
+    """Return the probability that a particle came out of a wall, or drove through one shortly before, (N,).
+
+    Parameters
+    ----------
+    static : (H, W) float
+        P(STATIC).
+    before, shortly_before : (N,) int
+        The cell of each particle `Walls.clearing_time` ago, and at the second look.
+    runs : (N,) bool
+        Whether it is faster than people walk. To it, a wall is nearly certain and one cell wider.
+    """
+    wall = static**WALL_EXPONENT
+    out_of_a_wall = np.where(runs, at_cells(largest_nearby(wall), before), at_cells(static, before))
+    through_a_wall = runs * at_cells(wall, shortly_before)
+    return np.maximum(out_of_a_wall, through_a_wall)
+
+
+def way_out(mixed: NDArray, ahead: NDArray, keeps: NDArray) -> NDArray[np.float64]:
+    """Return the probability that the cell ahead of a particle is free, or holds something that moves, (N,).
+
+    Parameters
+    ----------
+    mixed : (4, H, W) float
+        The four states before particles flew.
+    ahead : (N,) int
+        The cell in which each particle will be after `Walls.clearing_time`.
+    keeps : (N,) bool
+        Whether it keeps pace with the car. To it, a gap beside a hedge is no way out.
+    """
+    gap = keeps * at_cells(mixed[FREE] * largest_nearby(mixed[STATIC]), ahead)
+    return at_cells(mixed[FREE] + mixed[DYNAMIC], ahead) - gap
 
 
 def velocity_of(driven: ArrayLike, dt: float) -> NDArray[np.float64]:

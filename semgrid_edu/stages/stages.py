@@ -206,9 +206,9 @@ class Stages:
         """Raise an `ArgumentError` unless `run_frame` can run these stages: all five, and no generator among them."""
         self._need_all()
         for name in ("track", "remember"):
-            stage = getattr(self, name)
-            if stage is not None and not hasattr(stage, "step"):
-                raise ArgumentError(name, "an object with step(frame), see `Stages.started`", type(stage).__name__)
+            if name in self.given and not hasattr(getattr(self, name), "step"):
+                found = type(getattr(self, name)).__name__
+                raise ArgumentError(name, "an object with step(frame), see `Stages.started`", found)
 
     def _need_all(self) -> None:
         """Raise an `ArgumentError` if one of the paper's five stages was left out."""
