@@ -14,7 +14,6 @@ from tiny_notes import Note
 from tiny_runs import HandMadeData
 
 import semgrid_edu
-from semgrid_edu.datasets import training_cache
 from semgrid_edu.errors import DataError
 from semgrid_edu.labels import LABEL_SETS
 from semgrid_edu.storage.files import write_json
@@ -66,7 +65,6 @@ def made(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(SCALES, "tiny", TINY)
         patch.setattr(DataRun, "work", HandMadeData.work)
-        patch.setattr(training_cache, "WORKERS", 1)
         patch.setattr(training_runs, "seconds_per_step", lambda *_: 1.0)  # tried in test_own_backbone
         patch.setattr(reports, "workplace", lambda *_: nullcontext(Workplace(ThreadPoolExecutor(1), 1)))
         for name in MADE:

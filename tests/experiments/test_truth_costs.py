@@ -6,7 +6,6 @@ import pytest
 from tiny_runs import HandMadeData
 from worlds.lecture_09_policies import TRIALS
 
-from semgrid_edu.datasets import training_cache
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.labels import KITTI_14, UNKNOWN_OF_STATE
 from semgrid_edu.metrics import confusion_matrix
@@ -88,9 +87,7 @@ def counted(tmp_path_factory):
     root = tmp_path_factory.mktemp("runs")
     usual, bare = (ArraysRun(HandMadeData(), "train", truth) for truth in ("lidar", "no-cleanup"))
     run, here = LabelsRun(bare, usual), Workplace(ThreadPoolExecutor(1), 1)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(training_cache, "WORKERS", 1)  # six drives of two frames aren't worth a process
-        assert execute_plan(with_needs([run]), root, here) == {}
+    assert execute_plan(with_needs([run]), root, here) == {}
     return root, run
 
 
