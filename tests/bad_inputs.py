@@ -57,6 +57,11 @@ class Row(NamedTuple):
     spoil: Spoil = lambda _: None
 
 
+def rows(command: str, begins: str, *found: tuple) -> tuple[Row, ...]:
+    """Rows of one command that begins what it says with the same words: kind, what else it says, and what is spoilt."""
+    return tuple(Row(kind, command, begins + says, *spoil) for kind, says, *spoil in found)
+
+
 def text(name: str, content: str) -> Spoil:
     return lambda root: (root / name).parent.mkdir(exist_ok=True, parents=True) or (root / name).write_text(content)
 
@@ -261,15 +266,14 @@ DRIVES = (
         "a page in place of a file", DEMO.replace("OUT", "architecture.json"), "json: expected a folder, found the file"
     ),
     Row("no file of stages", f"{DEMO} --stages none.py", "none.py: expected a Python file"),
-    Row("stages that are a pipe", f"{DEMO} --stages my.py", "my.py: expected a Python file", pipe("my.py")),
-    Row(
-        "stages that can't be imported",
+    *rows(
         f"{DEMO} --stages my.py",
-        "my.py: expected .* import",
-        text("my.py", "import no"),
+        "my.py: ",
+        ("stages that are a pipe", "expected a Python file", pipe("my.py")),
+        ("stages that can't be imported", "expected .* import", text("my.py", "import no")),
+        ("stages without a stage", "expected at least one function", text("my.py", "")),
+        ("a stage without arguments", ".*refine", text("my.py", "def refine(): pass")),
     ),
-    Row("stages without a stage", f"{DEMO} --stages my.py", "my.py: expected at least one function", text("my.py", "")),
-    Row("a stage without arguments", f"{DEMO} --stages my.py", "my.py: .*refine", text("my.py", "def refine(): pass")),
 )
 
 INDEXES = (
@@ -291,44 +295,36 @@ INDEXES = (
 )
 
 WEIGHTS = (
-    Row("no weights", EVALUATE, "weights.safetensors: expected a safetensors file", gone("weights.safetensors")),
-    Row(
-        "weights that are a pipe",
+    *rows(
         EVALUATE,
-        "weights.safetensors: expected a safetensors file",
-        pipe("weights.safetensors"),
-    ),
-    Row(
-        "a pickle",
-        EVALUATE,
-        "weights.safetensors: expected a safetensors",
-        text("weights.safetensors", "\x80\x04pickle"),
-    ),
-    Row(
-        "weights cut short",
-        EVALUATE,
-        "weights.safetensors: expected a safetensors file",
-        cut("weights.safetensors", 0.5),
-    ),
-    Row("empty weights", EVALUATE, "weights.safetensors: expected a safetensors file", text("weights.safetensors", "")),
-    Row(
-        "weights of the image stage",
-        EVALUATE,
-        "weights.safetensors: expected a whole network",
-        lambda r: (r / "image_stage.safetensors").replace(r / "weights.safetensors"),
-    ),
-    Row("weights of NaN", EVALUATE, "weights.safetensors: expected finite numbers", tensors(lambda one: one * np.nan)),
-    Row(
-        "one infinite weight",
-        EVALUATE,
-        "weights.safetensors: expected finite numbers",
-        tensors(lambda one: one.masked_fill(one == one.max(), np.inf)),
-    ),
-    Row(
-        "variances below 0",
-        EVALUATE,
-        "weights.safetensors: expected variances of at least 0",
-        tensors(lambda one: -one - 1),
+        "weights.safetensors: ",
+        ("no weights", "expected a safetensors file", gone("weights.safetensors")),
+        ("weights that are a pipe", "expected a safetensors file", pipe("weights.safetensors")),
+        ("a pickle", "expected a safetensors", text("weights.safetensors", "\x80\x04pickle")),
+        ("empty weights", "expected a safetensors file", text("weights.safetensors", "")),
+        (
+            "weights of the image stage",
+            "expected a whole network",
+            lambda r: (r / "image_stage.safetensors").replace(r / "weights.safetensors"),
+        ),
+        ("weights of NaN", "expected finite numbers", tensors(lambda one: one * np.nan)),
+        (
+            "one infinite weight",
+            "expected finite numbers",
+            tensors(lambda one: one.masked_fill(one == one.max(), np.inf)),
+        ),
+        ("variances below 0", "expected variances of at least 0", tensors(lambda one: -one - 1)),
+        ("a header of 10^9 pixels", ".*image_size", header(image_size=[31623, 31623])),
+        (
+            "a header of 10^9 cells",
+            ".*grid",
+            header(grid={"x_min": 0, "x_max": 71, "y_min": -15.5, "y_max": 15.5, "cell": 0.001}),
+        ),
+        ("a header with a size of words", ".*header", header(image_size=["a", "b"])),
+        ("a header of an unknown network", ".*header", header(segmenter="vit")),
+        ("a header of another network", "expected", header(segmenter="fcn")),
+        ("a header that is a list", ".*a JSON object", raw_header("[]")),
+        ("no header", ".*header", lambda r: save_file({"a": torch.zeros(1)}, r / "weights.safetensors")),
     ),
     Row(
         "weights rounded to whole numbers",
@@ -341,23 +337,6 @@ WEIGHTS = (
         EVALUATE,
         "doubtful: .*weights.safetensors: expected a network that has learnt",
         lambda r: (r / "fresh.safetensors").replace(r / "weights.safetensors"),
-    ),
-    Row("a header of 10^9 pixels", EVALUATE, "weights.safetensors: .*image_size", header(image_size=[31623, 31623])),
-    Row(
-        "a header of 10^9 cells",
-        EVALUATE,
-        "weights.safetensors: .*grid",
-        header(grid={"x_min": 0, "x_max": 71, "y_min": -15.5, "y_max": 15.5, "cell": 0.001}),
-    ),
-    Row("a header with a size of words", EVALUATE, "weights.safetensors: .*header", header(image_size=["a", "b"])),
-    Row("a header of an unknown network", EVALUATE, "weights.safetensors: .*header", header(segmenter="vit")),
-    Row("a header of another network", EVALUATE, "weights.safetensors: expected", header(segmenter="fcn")),
-    Row("a header that is a list", EVALUATE, "weights.safetensors: .*a JSON object", raw_header("[]")),
-    Row(
-        "no header",
-        EVALUATE,
-        "weights.safetensors: .*header",
-        lambda r: save_file({"a": torch.zeros(1)}, r / "weights.safetensors"),
     ),
 )
 
@@ -375,20 +354,11 @@ RUNS = (
         text("OUT/checkpoint.safetensors", "x"),
     ),
     Row("too few frames for a batch", TRAIN, "--data: expected at least one batch of 6", frames()),
-    Row(
-        "a checkpoint whose header is a list",
+    *rows(
         f"{TRAIN} --resume",
-        "checkpoint.safetensors: expected a JSON object",
-        checkpoint({"run": "[1]", "iteration": "1"}),
-    ),
-    Row(
-        "a checkpoint of nothing", f"{TRAIN} --resume", "checkpoint.safetensors: expected a checkpoint", checkpoint({})
-    ),
-    Row(
-        "a checkpoint of step -1",
-        f"{TRAIN} --resume",
-        "checkpoint.safetensors: expected a checkpoint",
-        checkpoint({"run": "{}", "iteration": "-1"}),
+        "checkpoint.safetensors: ",
+        ("a checkpoint of nothing", "expected a checkpoint", checkpoint({})),
+        ("a checkpoint of step -1", "expected a checkpoint", checkpoint({"run": "{}", "iteration": "-1"})),
     ),
     Row("a training run in its data set", TRAIN.replace("OUT", "TINY"), "TINY: expected .*, found a data set"),
     Row(
@@ -412,26 +382,23 @@ RUNS = (
     Row("no steps", f"{TRAIN} --iterations 0", "Invalid value for '--iterations'"),
     Row("a seed that is a word", f"{TRAIN} --seed luck", "Invalid value for '--seed'"),
     Row("a seed below 0", f"{TRAIN} --seed=-1", "Invalid value for '--seed'"),
-    Row(
-        "a log without a finite number",
+    *rows(
         "curves RUN --out c.png",
-        "expected a finite loss",
-        log(Step(0, "image", 0.1, np.nan)),
+        "",
+        ("a log without a finite number", "expected a finite loss", log(Step(0, "image", 0.1, np.nan))),
+        ("a log without steps", "logs: expected", log()),
+        (
+            "a log with lines out of order",
+            "log.csv: expected step 1 in line 3",
+            log(Step(0, "image", 0.1, 1.0), Step(2, "image", 0.1, 1.0), Step(1, "image", 0.1, 1.0)),
+        ),
+        (
+            "a log that goes back to images",
+            "log.csv: .*image stage before the grid stage",
+            log(Step(0, "grid", 0.1, 1.0), Step(1, "image", 0.1, 1.0)),
+        ),
+        ("a log that is a pipe", "log.csv: expected the log", pipe(f"RUN/{LOG}")),
     ),
-    Row("a log without steps", "curves RUN --out c.png", "logs: expected", log()),
-    Row(
-        "a log with lines out of order",
-        "curves RUN --out c.png",
-        "log.csv: expected step 1 in line 3",
-        log(Step(0, "image", 0.1, 1.0), Step(2, "image", 0.1, 1.0), Step(1, "image", 0.1, 1.0)),
-    ),
-    Row(
-        "a log that goes back to images",
-        "curves RUN --out c.png",
-        "log.csv: .*image stage before the grid stage",
-        log(Step(0, "grid", 0.1, 1.0), Step(1, "image", 0.1, 1.0)),
-    ),
-    Row("a log that is a pipe", "curves RUN --out c.png", "log.csv: expected the log", pipe(f"RUN/{LOG}")),
     Row("no log", "curves SAMPLES --out c.png", "log.csv: expected the log"),
     Row("a picture of an unknown format", "curves RUN --out c.docx", "--out: expected a picture that ends in"),
     Row("a picture that can't say who made it", "curves RUN --out c.jpg", "--out: expected a picture that ends in"),
@@ -441,23 +408,17 @@ RUNS = (
 DATA = (
     Row("an unknown data set", "data make maxikitti OUT", "name: expected one of minikitti"),
     Row("a seed below 0, of data", "data make sample OUT --seed=-1", "seed: expected a whole number from 0 up"),
-    Row(
-        "data that another process makes",
+    *rows(
         "data make sample OUT",
-        "OUT/sample: expected a folder that no other process",
-        locked("OUT/sample"),
+        "OUT/sample",
+        ("data that another process makes", ": expected a folder that no other process", locked("OUT/sample")),
+        ("a folder with other files", ": expected an empty folder", text("OUT/sample/thesis.txt", "x")),
     ),
     Row("no workers", "data make sample OUT --workers 0", "--workers: expected at least one process"),
     Row(
         "1000 workers",
         "data make sample OUT --workers 1000",
         r"--workers: expected .* \d+ cores can be used here, found 1000",
-    ),
-    Row(
-        "a folder with other files",
-        "data make sample OUT",
-        "OUT/sample: expected an empty folder",
-        text("OUT/sample/thesis.txt", "x"),
     ),
     Row(
         "a data set of another seed",
@@ -499,29 +460,25 @@ COURSE = (
     Row("a class in no time", "course grade CLASS --timeout 0", "Invalid value for '--timeout'", a_class),
     Row("a class without memory", "course grade CLASS --memory 10", "Invalid value for '--memory'", a_class),
     Row("a class with many workers", "course grade CLASS --workers 65", "Invalid value for '--workers'", a_class),
-    Row(
-        "a course without exercises",
+    *rows(
         "course grade CLASS",
-        "CLASS/source: No such file",
-        lambda root: (a_class(root), shutil.rmtree(root / "CLASS" / "source")),
-    ),
-    Row(
-        "a course without its gradebook",
-        "course grade CLASS",
-        "gradebook.db: No such file",
-        a_class,
-    ),
-    Row(
-        "a gradebook that is another file",
-        "course grade CLASS",
-        "gradebook.db: expected nbgrader's gradebook, .* found another file",
-        lambda root: (a_class(root), text("CLASS/gradebook.db", "a,b\n")(root)),
-    ),
-    Row(
-        "a gradebook that is another program's",
-        "course grade CLASS",
-        "gradebook.db: expected nbgrader's gradebook, .* found another file",
-        lambda root: (a_class(root), a_foreign_database(root / "CLASS" / "gradebook.db")),
+        "",
+        (
+            "a course without exercises",
+            "CLASS/source: No such file",
+            lambda root: (a_class(root), shutil.rmtree(root / "CLASS" / "source")),
+        ),
+        ("a course without its gradebook", "gradebook.db: No such file", a_class),
+        (
+            "a gradebook that is another file",
+            "gradebook.db: expected nbgrader's gradebook, .* found another file",
+            lambda root: (a_class(root), text("CLASS/gradebook.db", "a,b\n")(root)),
+        ),
+        (
+            "a gradebook that is another program's",
+            "gradebook.db: expected nbgrader's gradebook, .* found another file",
+            lambda root: (a_class(root), a_foreign_database(root / "CLASS" / "gradebook.db")),
+        ),
     ),
 )
 
@@ -544,12 +501,16 @@ EXPERIMENTS = (
     Row("a tint that can't be", "train --data TINY --out OUT --tint -1", "--tint: expected a share from 0 to 1"),
     Row("no results to check", "reproduce check TINY", "TINY: expected results such as table1.json, found none"),
     Row("no folder of results", "reproduce check NONE", "NONE: expected results such as table1.json, found none"),
-    Row("results without counts", CHECK, "table1_counts.npz: expected a file, found nothing there", a_result()),
-    Row("counts cut short", CHECK, "table1_counts.npz: expected an npz file of arrays", a_result(b"PK\x03\x04")),
-    Row("counts of something else", CHECK, "table1_counts.npz: expected counts that", a_result({"a": np.zeros(2)})),
-    Row("counts of no run", CHECK, "expected the record of a run", a_result({"records.json": np.array("{}")})),
-    Row("counts with damaged records", CHECK, "expected a JSON object", a_result({"records.json": np.array("{")})),
-    Row("a result without a scale", CHECK, "table1.json: expected a result of", a_result({"records.json": "{}"}, "{}")),
+    *rows(
+        CHECK,
+        "",
+        ("results without counts", "table1_counts.npz: expected a file, found nothing there", a_result()),
+        ("counts cut short", "table1_counts.npz: expected an npz file of arrays", a_result(b"PK\x03\x04")),
+        ("counts of something else", "table1_counts.npz: expected counts that", a_result({"a": np.zeros(2)})),
+        ("counts of no run", "expected the record of a run", a_result({"records.json": np.array("{}")})),
+        ("counts with damaged records", "expected a JSON object", a_result({"records.json": np.array("{")})),
+        ("a result without a scale", "table1.json: expected a result of", a_result({"records.json": "{}"}, "{}")),
+    ),
     Row("a cache in place of a file", f"--cache architecture.json {TRAIN}", "architecture.json", frames()),
     Row(
         "a result over the weights",
@@ -575,17 +536,14 @@ EXPERIMENTS = (
     Row("a word for the number of seeds", f"{TABLE1} --seeds many", "Invalid value for '--seeds'"),
     Row("an unknown scale", TABLE1 + " --scale galactic", "--scale: expected"),
     Row("a file in place of the runs", TABLE1.replace("RUNS", "architecture.json"), "--runs: expected a folder"),
-    Row(
-        "a run's record that is a list",
+    *rows(
         TABLE1,
-        "ended.json: expected a JSON object",
-        text("RUNS/data-quickkitti/ended.json", "[]"),
-    ),
-    Row(
-        "a run's record with a word for its seconds",
-        TABLE1,
-        "ended.json: expected the record",
-        text("RUNS/data-quickkitti/ended.json", '{"seconds": "long", "date": "x"}'),
+        "ended.json: expected ",
+        (
+            "a run's record with a word for its seconds",
+            "the record",
+            text("RUNS/data-quickkitti/ended.json", '{"seconds": "long", "date": "x"}'),
+        ),
     ),
     *(
         Row(
@@ -607,7 +565,6 @@ IN_PLACE = "architecture.json: expected a folder, found the file"
 PAPERS = ("table1", "all")
 """Of the paper's experiments, which are one command, the first and all."""
 
-NOTES = "notes.json"
 LOST = "expected a new file, or an earlier result of this command, found something else, which would be lost"
 
 
@@ -633,7 +590,6 @@ def page(name: str) -> Spoil:
     return text(f"OUT/{name}", "<p>my own page</p>")
 
 
-MANY = str(10**18)
 REFUSED_FIRST = (
     *(row for name in PAPERS for row in of_paper(name)),
     Row("a page of one's own", DEMO, f"index.html: {LOST} without --force", page("index.html")),
@@ -687,19 +643,21 @@ REFUSED_FIRST = (
 )
 
 REFUSED_BY_NAME = (
-    Row("a card that is a list", CARD, r"card.json: expected a JSON object, found \[1\]", text("card.json", "[1]")),
-    Row("a card that is a folder", CARD, "card.json: expected a file, found a folder", folder("card.json")),
-    Row(
-        "a card with a number for its drives",
+    *rows(
         CARD,
-        "card.json: expected learned_drives: a list of names of folders, found 3",
-        text("card.json", '{"learned_drives": 3}'),
-    ),
-    Row(
-        "a card with a list for its words",
-        CARD,
-        "card.json: expected other_streets: a text, found",
-        text("card.json", '{"other_streets": [1]}'),
+        "card.json: expected ",
+        ("a card that is a list", r"a JSON object, found \[1\]", text("card.json", "[1]")),
+        ("a card that is a folder", "a file, found a folder", folder("card.json")),
+        (
+            "a card with a number for its drives",
+            "learned_drives: a list of names of folders, found 3",
+            text("card.json", '{"learned_drives": 3}'),
+        ),
+        (
+            "a card with a list for its words",
+            "other_streets: a text, found",
+            text("card.json", '{"other_streets": [1]}'),
+        ),
     ),
     Row("frames of 5000 digits", f"{DEMO} --frames 0:{'9' * 5000}", "--frames: expected FIRST:LAST"),
     Row("frames in digits of another script", f"{DEMO} --frames \u0660:\u0662", "--frames: expected FIRST:LAST"),
@@ -721,12 +679,6 @@ REFUSED_BY_NAME = (
         f"{UNPREPARED} --out OUT --resume",
         "checkpoint.safetensors: expected a safetensors file",
         text("OUT/checkpoint.safetensors", "my notes"),
-    ),
-    Row(
-        "a folder in place of a checkpoint",
-        f"{UNPREPARED} --out OUT --resume",
-        "checkpoint.safetensors: expected a safetensors file, found a folder",
-        lambda root: (root / "OUT" / "checkpoint.safetensors").mkdir(parents=True),
     ),
     Row(
         "an image stage to start from",

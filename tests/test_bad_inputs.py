@@ -8,7 +8,6 @@ import shutil
 from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
-from stat import S_ISDIR
 
 import pytest
 import typer
@@ -46,8 +45,8 @@ def write_dataset(root: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def prepared(tmp_path_factory) -> Path:
-    """What every row of the table finds."""
+def prepared(tmp_path_factory) -> Iterator[Path]:
+    """What every row of the table finds, and none changes."""
     root = tmp_path_factory.mktemp("prepared")
     write_dataset(root / "TINY")
     for split in ("train", "test", "validation"):
@@ -61,7 +60,9 @@ def prepared(tmp_path_factory) -> Path:
         save_net(net, root / f"{name}.safetensors")
     log(Step(0, "image", 0.1, 2.0))(root)
     sample(root)
-    return root
+    before = states(root)
+    yield root
+    assert states(root) == before
 
 
 def copied(source: str, target: str) -> None:
@@ -70,58 +71,22 @@ def copied(source: str, target: str) -> None:
     (os.link if large else shutil.copy2)(source, target)
 
 
-@pytest.fixture(scope="module")
-def spoilt(prepared, tmp_path_factory) -> Path:
-    """A copy for the rows to spoil, one after the other."""
-    return shutil.copytree(prepared, tmp_path_factory.mktemp("rows") / "place", copy_function=copied)
-
-
-@pytest.fixture(scope="module")
-def unspoilt(prepared, spoilt) -> Iterator[dict[str, tuple[int, ...]]]:
-    """The state in which every row leaves the copy behind, and that no row changes in what was copied."""
-    found = states(prepared)
-    assert states(spoilt) == found
-    yield found
-    assert states(prepared) == found
-
-
 @pytest.fixture
-def place(prepared, spoilt, unspoilt, monkeypatch) -> Iterator[Path]:
+def place(prepared, tmp_path, monkeypatch) -> Iterator[Path]:
     """A copy to spoil, as the current folder."""
+    spoilt = shutil.copytree(prepared, tmp_path / "place", copy_function=copied)
     monkeypatch.chdir(spoilt)
     monkeypatch.setenv(CACHE_VARIABLE, "")  # so that what --cache sets is undone afterwards
     yield spoilt
     while HELD:
         HELD.pop().__exit__(None, None, None)
-    mend(spoilt, prepared, unspoilt)
-    assert states(spoilt) == unspoilt
+    shutil.rmtree(spoilt)  # hundreds of files for each row
 
 
-def states(folder: Path) -> dict[str, tuple[int, ...]]:
-    """What shows that a file or folder was changed: its kind and rights, and of a file size and time."""
-    found = {}
-    for root, folders, files in os.walk(folder):
-        for path in (f"{root}/{name}" for name in folders + files):  # a Path of each would take most of the time
-            stat = os.lstat(path)
-            file = () if S_ISDIR(stat.st_mode) else (stat.st_size, stat.st_mtime_ns)
-            found[path.removeprefix(f"{folder}/")] = stat.st_mode, *file
-    return found
-
-
-def mend(folder: Path, original: Path, was: dict[str, tuple[int, ...]]) -> None:
-    """Make a spoilt copy as it was, which is faster than a new copy of hundreds of files."""
-    now = states(folder)
-    for name in sorted(now, reverse=True):  # what lies in a folder comes before the folder
-        if S_ISDIR(now[name][0]) and not S_ISDIR(was.get(name, (0,))[0]):
-            (folder / name).rmdir()
-        elif not S_ISDIR(now[name][0]) and now[name] != was.get(name):
-            (folder / name).unlink()
-    for name in sorted(name for name in was if now.get(name) != was[name]):
-        if S_ISDIR(was[name][0]):
-            (folder / name).mkdir(exist_ok=True)
-            (folder / name).chmod(was[name][0])
-        else:
-            copied(str(original / name), str(folder / name))
+def states(folder: Path) -> dict[Path, tuple[int, ...]]:
+    """What shows that a file or folder was changed: its kind and rights, size and time."""
+    found = {path: path.lstat() for path in folder.rglob("*")}
+    return {path: (stat.st_mode, stat.st_size, stat.st_mtime_ns) for path, stat in found.items()}
 
 
 @pytest.fixture
@@ -159,11 +124,11 @@ def test_a_bad_input_is_named(row, place, request, monkeypatch, capsys):
     if "doubtful" in row.says:
         request.getfixturevalue("no_work")
     row.spoil(place)
-    before, there = contents(place), states(place).keys()
+    before, there = contents(place), {*place.rglob("*")}
     says = told(shlex.split(row.command), monkeypatch, capsys)
     assert before.items() <= contents(place).items()  # nothing is lost
     # Arrays in the cache serve the next run, and Python keeps what it compiled.
-    left = {name for name in states(place).keys() - there if "/cache/" not in name and "__pycache__" not in name}
+    left = {path for path in {*place.rglob("*")} - there if not {"cache", "__pycache__"} & {*path.parts}}
     assert "doubtful" in row.says or not left
     assert re.search(row.says, says), says
     assert "Traceback" not in says

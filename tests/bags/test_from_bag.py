@@ -107,27 +107,23 @@ def test_any_layout_of_points_gives_a_reflectance_from_0_to_1(tmp_path, changes,
 
 
 @pytest.mark.parametrize(
-    "changes",
+    ("changes", "transforms"),
     [
-        {"base": ""},
-        {"pose_type": "geometry_msgs/msg/PoseStamped"},
-        {"pose_type": "geometry_msgs/msg/PoseWithCovarianceStamped"},
+        ({"base": ""}, TOPICS.transforms),
+        ({"pose_type": "geometry_msgs/msg/PoseStamped"}, TOPICS.transforms),
+        ({"pose_type": "geometry_msgs/msg/PoseWithCovarianceStamped"}, TOPICS.transforms),
+        ({"tf_topic": "/tf"}, ("/tf",)),  # beside those that change
     ],
 )
-def test_poses_without_a_frame_are_those_of_base_link(tmp_path, changes):
-    _, drive = converted(tmp_path, **changes)
+def test_poses_and_transforms_in_other_forms(tmp_path, changes, transforms):
+    """Poses without a frame are those of base_link."""
+    _, drive = converted(tmp_path, topics=TOPICS._replace(transforms=transforms), **changes)
     np.testing.assert_allclose(drive[0].T_world_from_lidar[:3, 3], T_BASE_FROM_LIDAR[:3, 3], atol=1e-6)
 
 
 def test_a_rectified_topic_may_have_distortion_and_takes_the_projection(tmp_path):
     _, drive = converted(tmp_path, topics=RECTIFIED, image_topic=RECTIFIED.image, distortion=0.1)
     np.testing.assert_allclose(drive.camera.K, K)
-
-
-def test_transforms_may_be_beside_those_that_change(tmp_path):
-    topics = TOPICS._replace(transforms=("/tf",))
-    _, drive = converted(tmp_path, topics=topics, tf_topic="/tf")
-    np.testing.assert_allclose(drive[0].T_world_from_lidar[:3, 3], T_BASE_FROM_LIDAR[:3, 3], atol=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -288,14 +284,3 @@ def test_the_demo_says_what_to_type_for_a_bag(tmp_path, kind):
         with pytest.raises(DataError, match="first type semgrid-edu data from-bag BAG DIR --image TOPIC") as caught:
             drive_at(path)
         assert "\n" not in str(caught.value)
-
-
-def test_a_height_in_the_calibration_must_be_one(tmp_path):
-    _, drive = converted(tmp_path)
-    path = drive.date_folder / "calib_velo_to_cam.txt"
-    text = path.read_text()
-    path.write_text(text.replace("lidar_height: 1.9", "lidar_height: -1.9"))
-    with pytest.raises(DataError, match=r"calib_velo_to_cam.txt: expected lidar_height: metres above the ground"):
-        KittiRawDrive(tmp_path / "out", "2026_01_01", "0001")[0]
-    path.write_text("".join(line for line in text.splitlines(keepends=True) if "height" not in line))
-    assert KittiRawDrive(tmp_path / "out", "2026_01_01", "0001").camera.lidar_height == 1.73

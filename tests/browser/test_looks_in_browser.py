@@ -99,12 +99,6 @@ class TestPhone:
         assert (slider["x"], slider["width"]) == pytest.approx((text["x"], text["width"]), abs=5)
         assert slider["width"] > 350
 
-    def test_two_grids_stand_side_by_side(self, phone):
-        boxes = [svg.bounding_box() for svg in phone.locator("svg[data-grid]").all()]
-        tops = [round(box["y"]) for box in boxes]
-        assert max(tops.count(top) for top in tops) == 2
-        assert all(box["width"] > 120 for box in boxes)
-
     def test_no_word_of_legend_tables_and_buttons_is_broken(self, phone):
         for part in (".legend", "table", "button", ".story h3, .story h4", ".pick"):
             assert phone.locator(part).evaluate_all(BROKEN_WORDS) == []

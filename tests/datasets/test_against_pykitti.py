@@ -3,6 +3,7 @@
 import numpy as np
 import pykitti
 import pytest
+from pykitti_peer import check_against_pykitti
 from scipy.spatial.transform import Rotation
 from tiny_drive import DATE, SIZE, write_packet, write_tiny_drive
 
@@ -34,13 +35,4 @@ def root(tmp_path_factory):
 
 
 def test_calibration_poses_points_and_images_agree(root):
-    drive, peer = KittiRawDrive(root, DATE, "0001"), pykitti.raw(str(root), DATE, "0001")
-    assert len(drive) == len(peer)
-    T_world_from_enu = np.linalg.inv(peer.oxts[0].T_w_imu)
-    for k, frame in enumerate(drive):
-        np.testing.assert_allclose(frame.camera.K, peer.calib.K_cam2, rtol=0, atol=1e-9)
-        np.testing.assert_allclose(frame.camera.T_camera_from_lidar, peer.calib.T_cam2_velo, rtol=0, atol=1e-9)
-        pose = T_world_from_enu @ peer.oxts[k].T_w_imu @ np.linalg.inv(peer.calib.T_velo_imu)
-        np.testing.assert_allclose(frame.T_world_from_lidar, pose, rtol=0, atol=1e-6)
-        np.testing.assert_array_equal(frame.points, peer.get_velo(k))
-        np.testing.assert_array_equal(frame.image, np.asarray(peer.get_cam2(k)))
+    check_against_pykitti(KittiRawDrive(root, DATE, "0001"), pykitti.raw(str(root), DATE, "0001"))

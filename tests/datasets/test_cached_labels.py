@@ -19,11 +19,6 @@ SMALL = (6, 20)
 EXACT = LidarTruth(flaws=NO_FLAWS)
 
 
-@pytest.fixture(autouse=True)
-def _no_workers(monkeypatch):
-    monkeypatch.setattr(training_cache, "WORKERS", 1)
-
-
 @pytest.fixture(scope="module")
 def root(tmp_path_factory):
     return write_tiny_dataset(tmp_path_factory.mktemp("tiny"))

@@ -133,6 +133,7 @@ class TestSoundDrive:
         shutil.rmtree(folder / "image_02")
         drive = KittiRawDrive(root, DATE, "0001")
         assert all(frame.image is None for frame in drive)
+        assert drive.camera.lidar_height == 1.73
         assert drive.problems() == []
 
 
@@ -230,6 +231,13 @@ def test_damage_is_named(root, name, damage):
     # Times that don't match are found by comparing two files; either may be the wrong one.
     assert path.name in str(caught.value)
     assert any(path.name in problem for problem in KittiRawDrive(root, DATE, "0001").problems())
+
+
+def test_a_lidar_below_the_ground_is_named(root):
+    with path_of(root, VELO).open("a") as file:
+        file.write("lidar_height: -1.9\n")
+    with pytest.raises(DataError, match=r"calib_velo_to_cam.txt: expected lidar_height: metres above the ground"):
+        read_all(root)
 
 
 def test_problems_lists_every_broken_file_at_once(root):

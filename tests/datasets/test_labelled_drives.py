@@ -21,11 +21,6 @@ def index(tmp_path_factory):
     return write_npz_drives(tmp_path_factory.mktemp("npz"))
 
 
-@pytest.fixture(autouse=True)
-def _in_this_process(monkeypatch):
-    monkeypatch.setattr(training_cache, "WORKERS", 1)
-
-
 def training(index, split="train", truth=None):
     return TrainingSet(index, split, SPEC, SIZE, truth=truth)
 

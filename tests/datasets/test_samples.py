@@ -7,7 +7,6 @@ import torch
 from tiny_drive import write_tiny_dataset
 
 from data_samples.make_frames import write_excerpt
-from semgrid_edu.datasets import training_cache
 from semgrid_edu.datasets.samples import (
     sample_drive,
     sample_frames,
@@ -30,9 +29,7 @@ from semgrid_edu.storage.tensors import read_tensors
 def excerpt(tmp_path_factory):
     """A data set and the excerpt of both frames of its training split."""
     root, samples = write_tiny_dataset(tmp_path_factory.mktemp("tiny")), tmp_path_factory.mktemp("samples")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(training_cache, "WORKERS", 1)  # processes take seconds to start
-        write_excerpt(root, 2, samples / "frames")
+    write_excerpt(root, 2, samples / "frames")
     return root, samples / "frames"
 
 

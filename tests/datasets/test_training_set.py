@@ -38,12 +38,6 @@ def no_work(monkeypatch):
     monkeypatch.setattr(training_cache, "in_each_drive", refuse)
 
 
-@pytest.fixture
-def in_this_process(monkeypatch):
-    """Make arrays without worker processes, which take seconds to start."""
-    monkeypatch.setattr(training_cache, "WORKERS", 1)
-
-
 @pytest.mark.usefixtures("no_work")
 class TestBuilt:
     def test_holds_what_the_readers_and_the_filter_give(self, built):
@@ -107,7 +101,6 @@ class TestBuilt:
             TrainingSet(built, "validation")
 
 
-@pytest.mark.usefixtures("in_this_process")
 class TestCacheFolder:
     def test_another_folder_leaves_the_data_as_they_are(self, tmp_path, monkeypatch):
         root = write_tiny_dataset(tmp_path / "data")
@@ -140,7 +133,8 @@ def test_the_command_line_passes_the_folder_on(tmp_path, monkeypatch):
     assert cache_folder(tmp_path) == tmp_path / "elsewhere"
 
 
-def test_error_in_a_worker_names_the_file_and_leaves_nothing(tmp_path):
+def test_error_in_a_worker_names_the_file_and_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(training_cache, "WORKERS", 2)
     root = write_tiny_dataset(tmp_path)
     scan = root / DATE / f"{DATE}_drive_0002_sync" / "velodyne_points" / "data" / "0000000001.bin"
     scan.write_bytes(b"short")
@@ -149,7 +143,6 @@ def test_error_in_a_worker_names_the_file_and_leaves_nothing(tmp_path):
     assert not list(root.glob("cache/train*"))
 
 
-@pytest.mark.usefixtures("in_this_process")
 class TestRefusals:
     def test_drives_of_two_cameras(self, tmp_path):
         root = write_tiny_dataset(tmp_path)

@@ -25,8 +25,6 @@ from semgrid_edu.workshop.paper.training_runs import GridStageRun
 from semgrid_edu.workshop.paper.verdicts import (
     ERROR_RATE,
     READINGS,
-    _judged,
-    claims_markdown,
     holm,
     verdict,
     which_hold,
@@ -302,17 +300,6 @@ def test_every_deviation_of_scale_is_told(scale):
     assert "CPU, in float32: image-a, grid-b." in "\n".join(
         deviations(scale, "kitti", ["image-a-seed0", "image-a-seed1", "grid-b-seed0"])
     )
-
-
-def test_the_page_shows_quote_rule_labels_and_every_verdict():
-    runs = SimpleNamespace(networks=networks(**SMOOTHED), taught_true=networks(**SMOOTHED)["segnet"])
-    found = {str(number): _judged(number, runs, None, 3, DRIVES) for number in (1, 2)}
-    text = claims_markdown({"rule": "The rule.", "claims": found})
-    assert all(words in text for words in (CLAIMS[1]["quote"], CLAIMS[2]["judged_by"], *READINGS.values()))
-    table = next(line for line in text.splitlines() if line.startswith("| 1 "))
-    assert table.count("reproduced") == 2
-    assert table.count(" - ") == 2
-    assert "Trained on LIDAR labels, judged by true labels: **reproduced**" in text
 
 
 @pytest.mark.parametrize("scale", SCALES.values(), ids=SCALES)

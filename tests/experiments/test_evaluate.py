@@ -8,7 +8,7 @@ import torch
 from tiny_drive import write_tiny_dataset
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets import KittiRawDrive, training_cache
+from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
@@ -153,8 +153,7 @@ def test_intervals_are_those_of_the_drives():
         assert found[cells]["pixel accuracy"] == list(drive_interval(by_drive[None], pixel_accuracy))
 
 
-def test_evaluates_a_network_from_disk_at_its_own_sizes(tmp_path, monkeypatch):
-    monkeypatch.setattr(training_cache, "WORKERS", 1)
+def test_evaluates_a_network_from_disk_at_its_own_sizes(tmp_path):
     root = write_tiny_dataset(tmp_path / "tiny")
     camera = KittiRawDrive(root, "2026_01_01", "0001").camera
     other = Architecture(image_size=(48, 160), grid=GridSpec(0.0, 71.0, -15.5, 15.5, 1.0), uses_return_heights=True)

@@ -8,7 +8,6 @@ import pytest
 from tiny_runs import HandMadeData
 from torch import nn
 
-from semgrid_edu.datasets import training_cache
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import SEGMENTERS
 from semgrid_edu.networks.segmenter import Segmenter
@@ -44,7 +43,6 @@ def here(monkeypatch):
     tiny = Scale(name="tiny", kitti="tinytested", image_iterations=1, grid_iterations=1, networks=("segnet",))
     monkeypatch.setitem(SCALES, "tiny", tiny)
     monkeypatch.setattr(DataRun, "work", HandMadeData.work)
-    monkeypatch.setattr(training_cache, "WORKERS", 1)
     tried = training_runs.seconds_per_step
     monkeypatch.setattr(training_runs, "TIMED_STEPS", 1)
     monkeypatch.setattr(

@@ -14,7 +14,6 @@ import pytest
 from tiny_notes import Note, wait_for
 from tiny_runs import results, tiny_training_runs
 
-from semgrid_edu.datasets import training_cache
 from semgrid_edu.errors import DataError
 from semgrid_edu.networks import WEIGHTS
 from semgrid_edu.workshop.paper.experiments import EXPERIMENTS
@@ -121,9 +120,7 @@ def test_names_tell_runs_apart_and_stages_are_shared(scale):
 def trained(tmp_path_factory):
     """Two tiny networks, trained without any interruption."""
     root = tmp_path_factory.mktemp("runs")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(training_cache, "WORKERS", 1)  # six drives of two frames aren't worth a process
-        assert execute_plan(with_needs(tiny_training_runs()), root, here()) == {}
+    assert execute_plan(with_needs(tiny_training_runs()), root, here()) == {}
     return root
 
 

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pykitti
 import pytest
+from pykitti_peer import check_against_pykitti
 
 from semgrid_edu.camera import project, transform_points
 from semgrid_edu.datasets import KittiRawDrive
@@ -22,30 +23,9 @@ def peer(kitti_root):
     return pykitti.raw(str(kitti_root), "2011_09_26", "0013")
 
 
-def test_drive_is_sound(drive, peer):
-    assert len(drive) == len(peer)
+def test_drive_is_sound_and_as_pykitti_reads_it(drive, peer):
     assert drive.problems() == []
-
-
-def test_calibration_equals_pykitti(drive, peer):
-    camera = drive[0].camera
-    np.testing.assert_allclose(camera.K, peer.calib.K_cam2, rtol=0, atol=1e-6)
-    np.testing.assert_allclose(camera.T_camera_from_lidar, peer.calib.T_cam2_velo, rtol=0, atol=1e-6)
-
-
-def test_poses_equal_pykitti(drive, peer):
-    # pykitti's world is east-north-up at the first packet; ours turns with the car, as in KITTI's own kit.
-    T_world_from_enu = np.linalg.inv(peer.oxts[0].T_w_imu)
-    T_imu_from_lidar = np.linalg.inv(peer.calib.T_velo_imu)
-    for frame, oxts in zip(drive, peer.oxts, strict=True):
-        expected = T_world_from_enu @ oxts.T_w_imu @ T_imu_from_lidar
-        np.testing.assert_allclose(frame.T_world_from_lidar, expected, rtol=0, atol=1e-6)
-
-
-def test_points_and_images_equal_pykitti(drive, peer):
-    for k in (0, 11, len(drive) - 1):
-        np.testing.assert_array_equal(drive[k].points, peer.get_velo(k))
-        np.testing.assert_array_equal(drive[k].image, np.asarray(peer.get_cam2(k)))
+    check_against_pykitti(drive, peer)
 
 
 def test_projection_agrees_with_the_whole_matrix_p_rect_02(drive, peer):

@@ -5,9 +5,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import torch
+from tiny_streets import CAMERA
 from typer.testing import CliRunner
 
-from semgrid_edu.camera import Camera
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError
@@ -27,11 +27,7 @@ class _Noise:
     """Six frames of noise, in the place of a data set on disk."""
 
     label_set = KITTI_14
-    camera = Camera(
-        np.array([[186, 0, 157], [0, 184, 44], [0, 0, 1.0]]),
-        np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]]),
-        Architecture().image_size,
-    )
+    camera = CAMERA.resized(Architecture().image_size)
 
     def __init__(self, dataset_dir, split, spec, image_size, truth):
         assert split == "train"
@@ -58,32 +54,38 @@ class _Noise:
         return Sample(image.to(torch.uint8), labels.to(torch.uint8), occupancy, truth.to(torch.uint8))
 
 
-def one_camera(*arguments, **named):
-    return [_Noise(*arguments, **named)]
-
-
 @pytest.fixture(autouse=True)
-def data_without_doubts(monkeypatch):
-    """The data set isn't on disk, so nothing can be asked of it."""
+def in_the_place_of_a_data_set(monkeypatch):
+    """Frames of noise, of which no doubt can be told."""
+    monkeypatch.setattr(experiment.TrainingSet, "by_camera", lambda *args, **named: [_Noise(*args, **named)])
     monkeypatch.setattr(dataset_doubts, "dataset_doubts", lambda *_: [])
+
+
+@pytest.fixture
+def data(tmp_path):
+    write_text(tmp_path / "minikitti" / "dataset.json", "{}")
+    return tmp_path / "minikitti"
+
+
+def trained(data, *options):
+    """Train by the command; return its provenance."""
+    out = data.parent / "out"
+    command = ["train", "--data", str(data), "--out", str(out), *map(str, options)]
+    result = CliRunner().invoke(app, command, catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    return json.loads((out / "provenance.json").read_text())
 
 
 class _Net:
     segmenter = object()
 
 
-def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
-    monkeypatch.setattr(experiment.TrainingSet, "by_camera", one_camera)
-    data, out = tmp_path / "minikitti", tmp_path / "compact"
-    write_text(data / "dataset.json", "{}")
-    options = ["--segmenter", "fcn", "--seed", "3", "--iterations", "1"]
-    result = CliRunner().invoke(app, ["train", "--data", str(data), "--out", str(out), *options])
-    assert result.exit_code == 0, result.output
+def test_the_command_leaves_weights_log_and_provenance(data):
+    provenance, out = trained(data, "--segmenter", "fcn", "--seed", 3, "--iterations", 1), data.parent / "out"
     names = {"weights.safetensors", "image_stage.safetensors", "log.csv", "provenance.json"}
     assert {path.name for path in out.iterdir()} == names
     assert not provenance_problems(out)
-    provenance = json.loads((out / "provenance.json").read_text())
-    options = "--data minikitti --out compact --segmenter fcn --seed 3 --iterations 1"
+    options = "--data minikitti --out out --segmenter fcn --seed 3 --iterations 1"
     assert provenance["command"] == f"semgrid-edu train {options}"
     assert provenance["seed"] == 3
     assert provenance["params"]["batch_size"] == 6
@@ -93,16 +95,13 @@ def test_the_command_leaves_weights_log_and_provenance(monkeypatch, tmp_path):
     assert isinstance(load_net(out / "weights.safetensors", _Noise.camera).segmenter, Fcn)
 
 
-def test_a_network_gets_the_classes_of_its_data(monkeypatch, tmp_path):
+def test_a_network_gets_the_classes_of_its_data(monkeypatch, data):
     """minisynthia has ten classes and no unknown ones; networks have KITTI-14 by default."""
     built = {}
     monkeypatch.setattr(_Noise, "label_set", SYNTHIA_10)
-    monkeypatch.setattr(experiment.TrainingSet, "by_camera", one_camera)
     monkeypatch.setattr(experiment, "build_net", lambda description, *_: built.update(net=description) or _Net)
     monkeypatch.setattr(experiment, "train", lambda *_: None)
-    write_text(tmp_path / "minisynthia" / "dataset.json", "{}")
-    params = experiment.training_params("compact", 1)
-    experiment.train_network(tmp_path / "minisynthia", tmp_path / "out", "segnet", params)
+    trained(data, "--iterations", 1)
     assert built["net"].label_set == SYNTHIA_10.name
 
 
@@ -118,29 +117,25 @@ def test_a_paper_preset_is_the_papers():
 
 
 @pytest.mark.parametrize("truth", ["lidar", "camera-mask"])
-def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
+def test_the_options_reach_the_training(monkeypatch, data, truth):
     """The paper's networks don't fit a test: what trains them is looked at instead."""
     given = {}
-    monkeypatch.setattr(experiment.TrainingSet, "by_camera", one_camera)
     monkeypatch.setattr(experiment, "build_net", lambda description, *_: given.update(net=description) or _Net)
     monkeypatch.setattr(experiment, "load_imagenet", lambda segmenter, path: given.update(imagenet=(segmenter, path)))
     monkeypatch.setattr(experiment, "train", lambda *args: given.update(train=args))
-    data, imagenet, out = tmp_path / "minikitti", tmp_path / "vgg16.safetensors", tmp_path / "out"
-    write_text(data / "dataset.json", "{}")
+    imagenet = data.parent / "vgg16.safetensors"
     write_text(imagenet, "{}")
-    options = ["--preset", "paper", "--imagenet", str(imagenet), "--seed", "2", "--iterations", "7", "--two-stage"]
+    options = ["--preset", "paper", "--imagenet", imagenet, "--seed", 2, "--iterations", 7, "--two-stage"]
     options += ["--truth", truth, "--resume", "--return-heights", "--image-size", "192x640", "--fill-gaps"]
-    result = CliRunner().invoke(app, ["train", "--data", str(data), "--out", str(out), *options, "--device", "cpu"])
-    assert result.exit_code == 0, result.output
+    provenance = trained(data, *options, "--device", "cpu")
     usual = experiment.architecture("segnet", "paper")
     assert given["net"] == replace(usual, uses_return_heights=True, image_size=(192, 640))
     assert given["imagenet"] == (_Net.segmenter, str(imagenet))
     net, dataset, folder, params, seed, resume, fabric = given["train"]
     assert dataset.truth == LidarTruth(POLICIES[truth], TruthFlaws())
     assert dataset.gaps_filled
-    assert (net, folder, seed, resume, fabric.device) == (_Net, out, 2, True, torch.device("cpu"))
+    assert (net, folder, seed, resume, fabric.device) == (_Net, data.parent / "out", 2, True, torch.device("cpu"))
     assert params == experiment.training_params("paper", 7, end_to_end=False, from_imagenet=True)
-    provenance = json.loads((out / "provenance.json").read_text())
     written = "--segmenter segnet --preset paper --return-heights --image-size 192x640 --imagenet vgg16.safetensors"
     written += f" --seed 2 --iterations 7 --two-stage --truth {truth} --fill-gaps"
     assert provenance["command"] == f"semgrid-edu train --data minikitti --out out {written}"
@@ -151,44 +146,32 @@ def test_the_options_reach_the_training(monkeypatch, tmp_path, truth):
 
 
 @pytest.mark.parametrize("members", [1, 2])
-def test_a_network_starts_from_another_and_says_so(monkeypatch, tmp_path, members):
-    monkeypatch.setattr(experiment.TrainingSet, "by_camera", one_camera)
-    data, first = tmp_path / "minikitti", tmp_path / "first.safetensors"
-    write_text(data / "dataset.json", "{}")
+def test_a_network_starts_from_another_and_says_so(monkeypatch, data, tmp_path, members):
+    first = tmp_path / "first.safetensors"
     save_net(start := build_net(Architecture(n_segmenters=members), _Noise.camera, seed=5), first)
     monkeypatch.setattr(experiment, "train", lambda net, *_: built.update(net.state_dict()))
     built = {}
-    options = ["--data", str(data), "--data", str(data), "--from", str(first), "--out", str(tmp_path / "out")]
-    result = CliRunner().invoke(app, ["train", *options])
-    assert result.exit_code == 0, result.output
+    provenance = trained(data, "--data", data, "--from", first)
     assert all(torch.equal(tensor, built[name]) for name, tensor in start.state_dict().items())
-    provenance = json.loads((tmp_path / "out" / "provenance.json").read_text())
     said = f"--data minikitti --data minikitti --out out --segmenter segnet --from {tmp_path.name}/first.safetensors"
     assert said in provenance["command"]
     assert provenance["from"] == [sha256(first)]
     assert provenance["dataset"] == 2 * [sha256(data / "dataset.json")]
 
 
-def test_the_mean_of_several_networks_starts_from_them_and_only_its_fusion_learns(monkeypatch, tmp_path):
-    monkeypatch.setattr(experiment.TrainingSet, "by_camera", one_camera)
-    data, files = tmp_path / "minikitti", [tmp_path / f"{seed}.safetensors" for seed in (5, 6)]
-    write_text(data / "dataset.json", "{}")
+def test_the_mean_of_several_networks_starts_from_them_and_only_its_fusion_learns(monkeypatch, data, tmp_path):
+    files = [tmp_path / f"{seed}.safetensors" for seed in (5, 6)]
     starts = [build_net(Architecture(), _Noise.camera, seed=seed).eval() for seed in (5, 6)]
     for start, file in zip(starts, files, strict=True):
         save_net(start, file)
     given = {}
     monkeypatch.setattr(experiment, "train", lambda net, *others: given.update(net=net.eval(), params=others[2]))
-    options = ["--data", str(data), "--from", str(files[0]), "--from", str(files[1]), "--out", str(tmp_path / "out")]
-    with pytest.raises(
-        ArgumentError, match=r"--from: expected one network, or --two-stage .* found 2 networks without"
-    ):
-        CliRunner().invoke(app, ["train", *options], catch_exceptions=False)
+    options = ["--from", files[0], "--from", files[1]]
+    with pytest.raises(ArgumentError, match=r"--from: expected one network, or --two-stage .* 2 networks without"):
+        trained(data, *options)
     with pytest.raises(ArgumentError, match=r"--from: expected at most 9 image networks together, found 10 files"):
-        CliRunner().invoke(
-            app, ["train", *options, *8 * ["--from", str(files[0])], "--two-stage"], catch_exceptions=False
-        )
-    result = CliRunner().invoke(app, ["train", *options, "--two-stage"])
-    assert result.exit_code == 0, result.output
+        trained(data, *5 * options, "--two-stage")
+    provenance = trained(data, *options, "--two-stage")
     image = torch.rand(1, 3, *Architecture().image_size)
     with torch.no_grad():
         mean = (starts[0].segmenter(image) + starts[1].segmenter(image)) / 2
@@ -196,7 +179,6 @@ def test_the_mean_of_several_networks_starts_from_them_and_only_its_fusion_learn
     learned = given["net"].fusion.state_dict()
     assert all(torch.equal(tensor, learned[name]) for name, tensor in starts[0].fusion.state_dict().items())
     assert (given["params"].image_iterations, given["params"].end_to_end) == (0, False)
-    provenance = json.loads((tmp_path / "out" / "provenance.json").read_text())
     assert "".join(f" --from {tmp_path.name}/{file.name}" for file in files) in provenance["command"]
     assert provenance["from"] == [sha256(file) for file in files]
 
