@@ -1,15 +1,18 @@
-"""The training loop: stochastic gradient descent, first on images, then end to end (paper, section 4.1)."""
+"""The training loop: stochastic gradient descent, first on images, then end to end (paper, section 4.1).
+
+`fit` learns, one step after the other; `train` writes what a run leaves behind: its log, checkpoints and weights.
+"""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import torch
-from torch import nn
-from tqdm.auto import trange
+from torch import Tensor, nn
+from tqdm.auto import tqdm
 
 from semgrid_edu.datasets.training_set import Mixture, Sample
 from semgrid_edu.errors import ArgumentError
@@ -84,12 +87,10 @@ def train(
     alpha = {stage: class_weights(dataset, stage, net.n_classes, params.weight_limit) for stage in params.stages}
     run = {"seed": seed, "frames": len(dataset), **asdict(params), **asdict(net.need_architecture())}
     run |= {f"{stage} class weights": weights.tolist() for stage, weights in alpha.items()}
-    parts = dataset.parts if isinstance(dataset, Mixture) else ()
-    kind = type(net.sampler)
-    samplers = {part: plane_sampler(net.architecture, part.camera, kind).to(fabric.device) for part in parts}
 
     check_folder(folder, resume)
-    with sole_writer(folder) if fabric.is_global_zero else nullcontext(), _freezing(net) as learnable:
+    first_process = fabric.is_global_zero  # it alone writes
+    with sole_writer(folder) if first_process else nullcontext():
         check_folder(folder, resume)  # check again: until now another process could write to it
         fabric.barrier()  # process 0 writes its log only when all have checked, or a slow one would reject that log
         net.to(fabric.device)
@@ -99,37 +100,79 @@ def train(
         start = 0
         if (folder / CHECKPOINT).exists():
             start = load_checkpoint(folder / CHECKPOINT, run, net, optimiser)
-        if fabric.is_global_zero:
+        if first_process:
             begin_log(folder / LOG, start)
 
-        steps = trange(
-            start, params.iterations, initial=start, total=params.iterations, disable=not fabric.is_global_zero
-        )
-        for iteration in steps:
+        steps = fit(net, dataset, optimiser, params, alpha, seed, fabric, start)
+        shown = tqdm(steps, initial=start, total=params.iterations, disable=not first_process)
+        for step in shown:
+            shown.set_postfix(stage=step.stage, loss=f"{step.loss:.3f}", refresh=False)
+            if not first_process:
+                continue
+            append_step(folder / LOG, step)
+            if step.iteration + 1 == params.image_iterations:
+                save_net(net, folder / IMAGE_STAGE)
+            if (step.iteration + 1) % CHECKPOINT_EVERY == 0:
+                save_checkpoint(folder / CHECKPOINT, run, net, optimiser, step.iteration + 1)
+        if first_process:
+            save_net(net, folder / WEIGHTS)
+            (folder / CHECKPOINT).unlink(missing_ok=True)
+    net.eval()
+
+
+def fit(
+    net: SemanticGridNet,
+    dataset: Sequence[Sample],
+    optimiser: torch.optim.Optimizer,
+    params: TrainingParams,
+    alpha: Mapping[str, Tensor],
+    seed: int,
+    fabric: "Fabric",
+    start: int = 0,
+) -> Iterator[Step]:
+    """Learn: draw a batch, go one step down the gradient of its loss, and again.
+
+    Parameters
+    ----------
+    net, dataset, params, seed, fabric
+        Those of `train`.
+    optimiser : Optimizer
+        The optimiser of the trainable weights, from `make_optimiser`.
+    alpha : dict of str to (C,) float
+        The class weights of the loss in each stage, "image" and "grid".
+    start : int
+        The number of the first step.
+
+    Yields
+    ------
+    Step
+        After each step; the network has changed.
+    """
+    samplers = _samplers(net, dataset, fabric.device)
+    with _freezing(net) as learnable:
+        for iteration in range(start, params.iterations):
             stage, rate = params.stage(iteration)
             if iteration in (start, params.image_iterations):  # a stage begins
                 _begin_stage(net, stage, params.end_to_end, learnable)
                 objective = fabric.setup_module(Objective(net, stage, alpha[stage]))
             for group in optimiser.param_groups:
                 group["lr"] = rate * group["share"]
+
             batch = draw_batch(dataset, params.batch_size, params.jitter, iteration, seed, params.mirror, params.tint)
-            if parts:
+            if samplers:
                 batch = batch._replace(sampler=samplers[dataset.turn(iteration)[0]])
             batch = share_of_batch(batch, fabric.global_rank, fabric.world_size, fabric.device)
             step = Step(iteration, stage, rate, learn(fabric, objective, optimiser, batch))
             _check_finite(step, params.learning_rate)
-            steps.set_postfix(stage=stage, loss=f"{step.loss:.3f}", refresh=False)
+            yield step
 
-            if fabric.is_global_zero:
-                append_step(folder / LOG, step)
-                if iteration + 1 == params.image_iterations:
-                    save_net(net, folder / IMAGE_STAGE)
-                if (iteration + 1) % CHECKPOINT_EVERY == 0:
-                    save_checkpoint(folder / CHECKPOINT, run, net, optimiser, iteration + 1)
-        if fabric.is_global_zero:
-            save_net(net, folder / WEIGHTS)
-            (folder / CHECKPOINT).unlink(missing_ok=True)
-    net.eval()
+
+def _samplers(net: SemanticGridNet, dataset: Sequence[Sample], device: torch.device) -> dict[Sequence, nn.Module]:
+    """Return equation (2) for the camera of each part of a mixture; one camera has the network's own sampler."""
+    if not isinstance(dataset, Mixture):
+        return {}
+    kind = type(net.sampler)
+    return {part: plane_sampler(net.architecture, part.camera, kind).to(device) for part in dataset.parts}
 
 
 def make_optimiser(net: SemanticGridNet, params: TrainingParams) -> torch.optim.Optimizer:
