@@ -127,7 +127,8 @@ class Camera:
         size : (int, int)
             The new height and width, pixels.
         """
-        scale_v, scale_u = size[0] / self.size[0], size[1] / self.size[1]
+        scale_v = size[0] / self.size[0]
+        scale_u = size[1] / self.size[1]
         S = np.array([[scale_u, 0, (scale_u - 1) / 2], [0, scale_v, (scale_v - 1) / 2], [0, 0, 1]])
         return replace(self, K=S @ self.K, size=tuple(size))
 
@@ -141,7 +142,8 @@ def _check_matrix(name: str, expected: str, matrix: NDArray, shape: tuple[int, i
 
 def _check_pinhole(K: NDArray, size: NDArray) -> None:
     """Reject focal lengths (pixels) that no lens has, for images of (w, h) pixels."""
-    (shortest, longest), focal_lengths = FOCAL_LENGTHS, np.diag(K)[:2]
+    shortest, longest = FOCAL_LENGTHS
+    focal_lengths = np.diag(K)[:2]
     if not ((focal_lengths >= shortest * size) & (focal_lengths <= longest * size)).all():
         expected = f"focal lengths of {shortest:g} to {longest:g} times {size[0]} x {size[1]} pixels"
         raise ArgumentError("K", expected, focal_lengths.tolist())
@@ -177,5 +179,6 @@ def project(points: NDArray, camera: Camera) -> tuple[NDArray, NDArray[np.bool_]
     depth = np.where(points[..., 2] > 0, points[..., 2], np.nan)
     pixels = (points @ camera.K.T.astype(points.dtype))[..., :2] / depth[..., None]
     height, width = camera.size
-    u, v = pixels[..., 0], pixels[..., 1]
+    u = pixels[..., 0]
+    v = pixels[..., 1]
     return pixels, (u >= 0) & (u <= width - 1) & (v >= 0) & (v <= height - 1)

@@ -32,7 +32,8 @@ def confusion_matrix(truth: ArrayLike, predicted: ArrayLike, n_classes: int, ign
     array([[1, 1],
            [0, 1]])
     """
-    truth, predicted = np.asarray(truth), np.asarray(predicted)
+    truth = np.asarray(truth)
+    predicted = np.asarray(predicted)
     if truth.shape != predicted.shape:
         raise ArgumentError("predicted", f"the shape of truth, {truth.shape}", predicted.shape)
     labelled = truth != ignore
@@ -108,7 +109,8 @@ def frequency_weighted_iou(confusion: ArrayLike) -> float:
     / (n_c + m_c - TP_c); NaN when no cell is labelled. Parameters are those of `pixel_accuracy`.
     """
     matrix = _matrix(confusion)
-    cells, hits = matrix.sum(axis=1), np.diag(matrix)
+    cells = matrix.sum(axis=1)
+    hits = np.diag(matrix)
     present = cells > 0
     union = cells + matrix.sum(axis=0) - hits
     return _ratio((cells[present] * hits[present] / union[present]).sum(), cells.sum())

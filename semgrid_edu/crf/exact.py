@@ -209,7 +209,8 @@ def log_partition(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> flo
 def _tiny_model(unary: ArrayLike, values: ArrayLike, params: CrfParams) -> tuple[GraphicalModel, tuple[int, ...]]:
     """Return the model, with costs relative to each cell's cheapest class, and (C, H, W); too many labellings raise."""
     unary, values = check_inputs(unary, values)
-    classes, cells = len(unary), unary[0].size
+    classes = len(unary)
+    cells = unary[0].size
     if cells * np.log10(classes) > np.log10(MAX_LABELLINGS):
         expected = f"at most {MAX_LABELLINGS:,} labellings; mean_field takes more"
         raise ArgumentError("unary", expected, f"{classes} classes in {cells} cells, {classes}^{cells}")

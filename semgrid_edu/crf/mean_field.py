@@ -153,7 +153,9 @@ class SeparableGaussian:
         normalization : {"symmetric", "none"}
             How the kernel is normalised, see `CrfParams`.
         """
-        rows, columns = (_between(size, max(sigma, NARROWEST)) for size in shape)
+        sigma = max(sigma, NARROWEST)
+        rows = _between(shape[0], sigma)
+        columns = _between(shape[1], sigma)
         if normalization == "symmetric":
             normalise(rows)
             normalise(columns)
@@ -166,7 +168,8 @@ class SeparableGaussian:
 
     def __call__(self, values: NDArray[np.floating]) -> NDArray[np.float64]:
         """Return sum_j k_ij values_j, the cell itself included; one row per cell, (H W, K)."""
-        height, width = len(self.rows), len(self.columns)
+        height = len(self.rows)
+        width = len(self.columns)
         summed = self.rows @ values.reshape(height, -1)  # over the rows of the grid, for each column and value
         summed = self.columns @ summed.reshape(height, width, -1)  # over the columns
         return summed.reshape(values.shape)
@@ -298,7 +301,8 @@ def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.floati
         When the shapes don't fit, a cost is NaN or -inf, a cell has no possible class, states don't sum to 1, or an
         argument holds anything but real numbers, or masked ones.
     """
-    unary, values = _floats("unary", unary), _floats("values", values)
+    unary = _floats("unary", unary)
+    values = _floats("values", values)
     if unary.ndim != 3 or 0 in unary.shape:
         raise ArgumentError("unary", "shape (C, H, W), nothing empty", f"shape {unary.shape}")
     check_shape("values", values, (N_STATES, *unary.shape[1:]))

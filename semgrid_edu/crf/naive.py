@@ -40,8 +40,7 @@ def kernels(values: ArrayLike, params: CrfParams) -> tuple[NDArray[np.float64], 
     occupancy = values.reshape(len(values), -1).T
     both = np.hstack([place / params.sigma_alpha, occupancy / params.sigma_beta])
     alone = place / params.sigma_gamma
-    bilateral, spatial = (np.exp(-cdist(features, features, "sqeuclidean") / 2) for features in (both, alone))
-    return bilateral, spatial
+    return np.exp(-cdist(both, both, "sqeuclidean") / 2), np.exp(-cdist(alone, alone, "sqeuclidean") / 2)
 
 
 def gram_matrix(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:

@@ -192,7 +192,8 @@ def _check_distribution(name: str, values: NDArray, to_probability: Callable[[ND
 
 def _labelled(name: str, columns: ArrayLike, truth: ArrayLike, ignore: int) -> tuple[NDArray, NDArray[np.int64]]:
     """Return the columns (C, N) and the classes (N,) of the labelled cells, after checking that they fit."""
-    columns, truth = np.asarray(columns), np.asarray(truth)
+    columns = np.asarray(columns)
+    truth = np.asarray(truth)
     if columns.ndim == 0 or columns.shape[1:] != truth.shape:
         raise ArgumentError(name, f"shape (C, {', '.join(map(str, truth.shape))})", f"shape {columns.shape}")
     kept = truth != ignore

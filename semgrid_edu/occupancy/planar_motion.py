@@ -64,7 +64,8 @@ class PlanarMotion:
     @property
     def rotation(self) -> NDArray[np.float64]:
         """(2, 2): turns vectors along the child's axes into vectors along the parent's."""
-        cos, sin = np.cos(self.dyaw), np.sin(self.dyaw)
+        cos = np.cos(self.dyaw)
+        sin = np.sin(self.dyaw)
         return np.array([[cos, -sin], [sin, cos]])
 
     @property
@@ -163,7 +164,8 @@ def scroll(pose: PlanarMotion, cell: float) -> tuple[PlanarMotion, PlanarMotion]
     (PlanarMotion(dx=1.0, dy=0.0, dyaw=0.0), PlanarMotion(dx=0.25, dy=0.0, dyaw=0.3))
     """
     # The remainder of a division by the cell, between minus and plus half a cell.
-    dx, dy = math.remainder(pose.dx, cell), math.remainder(pose.dy, cell)
+    dx = math.remainder(pose.dx, cell)
+    dy = math.remainder(pose.dy, cell)
     return PlanarMotion(pose.dx - dx, pose.dy - dy), PlanarMotion(dx, dy, pose.dyaw)
 
 

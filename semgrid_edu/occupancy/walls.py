@@ -151,9 +151,9 @@ class Walls:
         """
         runs = np.hypot(*particles.velocity.T) > self.running_speed
         keeps = self.keeps_pace(particles.velocity, velocity_of(driven, dt), spec.cell)
-        before, shortly_before, ahead = (
-            self._other_cells(particles, cells, spec, fraction) for fraction in (-1, -self.second_look, 1)
-        )
+        before = self._other_cells(particles, cells, spec, -1)
+        shortly_before = self._other_cells(particles, cells, spec, -self.second_look)
+        ahead = self._other_cells(particles, cells, spec, 1)
         suspicion = from_a_wall(mixed[STATIC], before, shortly_before, runs)
         return suspicion * (1 - way_out(mixed, ahead, keeps)) * at_cells(unseen, cells)
 

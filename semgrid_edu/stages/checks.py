@@ -149,7 +149,8 @@ def class_probabilities(stage: CheckedStage, values: NDArray) -> None:
     stage, values
         Those of `finite`.
     """
-    least, most = values.min(), values.max()
+    least = values.min()
+    most = values.max()
     if not (least >= -TOLERANCE and most <= 1 + TOLERANCE):  # true for NaN as well
         found = f"{least:.4g} to {most:.4g}: sample the soft-max of s over axis 0"
         raise stage.error("class probabilities, because the network uses return heights", found)
