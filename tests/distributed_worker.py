@@ -7,7 +7,7 @@ from pathlib import Path
 
 import torch
 from lightning_fabric import Fabric
-from tiny_streets import CAMERA, SMALL, tiny_streets
+from tiny_streets import CAMERA, SMALL, Watched, kill, tiny_streets
 from torch import nn
 
 from semgrid_edu.networks import build_net
@@ -48,23 +48,6 @@ def fit_batch():
     return x, y, torch.tensor([5.0, 3, 4, 1, 0, 0.5, 0, 0.1], dtype=torch.float64)
 
 
-class Broken(list):
-    """Streets that can be read so many times."""
-
-    def __init__(self, streets, reads):
-        super().__init__(streets)
-        self.reads = reads
-
-    def __iter__(self):
-        return (self[k] for k in range(len(self)))
-
-    def __getitem__(self, k):
-        self.reads -= 1
-        if self.reads < 0:
-            raise InterruptedError
-        return super().__getitem__(k)
-
-
 def share(folder, fabric):
     """A few steps, each process with half of the batch; and what only one process does first."""
     half = slice(4 * fabric.global_rank, 4 * fabric.global_rank + 4)
@@ -87,7 +70,13 @@ def learn_streets(folder, fabric):
         fabric=fabric,
     )
     try:
-        train(build_net(SMALL, CAMERA), Broken(streets, 3 * FRAMES + 5 * 4), folder / "resumed", QUICK, fabric=fabric)
+        train(
+            build_net(SMALL, CAMERA),
+            Watched(streets, 3 * FRAMES + 5 * 4, kill),
+            folder / "resumed",
+            QUICK,
+            fabric=fabric,
+        )
     except InterruptedError:
         train(build_net(SMALL, CAMERA, seed=5), streets, folder / "resumed", QUICK, resume=True, fabric=fabric)
 
@@ -119,7 +108,7 @@ def refuse(folder, fabric):
 def fail(folder, fabric):
     """The second process alone meets an error, while the first waits for it."""
     streets = tiny_streets()
-    data = Broken(streets, 17) if fabric.global_rank == 1 else streets
+    data = Watched(streets, 17, kill) if fabric.global_rank == 1 else streets
     train(build_net(SMALL, CAMERA), data, folder / "fails", TrainingParams(10, 10, 2), fabric=fabric)
 
 

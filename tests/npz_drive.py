@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from tiny_drive import CAMERA_FROM_LIDAR, SIZE, K
 
 from semgrid_edu.camera import Camera
 from semgrid_edu.datasets import DatasetIndex, LabelledFrame
@@ -12,11 +13,7 @@ from semgrid_edu.datasets.project_lidar import birdseye_votes, closest_returns
 from semgrid_edu.frame import Frame
 from semgrid_edu.labels import KITTI_14
 
-CAMERA = Camera(
-    np.array([[20.0, 0.0, 19.5], [0.0, 20.0, 5.5], [0.0, 0.0, 1.0]]),
-    np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, -0.1], [1.0, 0.0, 0.0, -0.3], [0.0, 0.0, 0.0, 1.0]]),
-    (12, 40),
-)
+CAMERA = Camera(K, CAMERA_FROM_LIDAR, SIZE)
 
 
 class NpzDrive(FrameSequence):

@@ -1,5 +1,7 @@
 """A small network and streets in blocks of three colours, one a class, that it learns in seconds."""
 
+from collections.abc import Callable
+
 import numpy as np
 import torch
 
@@ -20,6 +22,29 @@ CAMERA = Camera(
 
 def tiny_streets(n: int = 4) -> list[Sample]:
     return [_street(seed) for seed in range(n)]
+
+
+class Watched:
+    """Streets, and what happens as they are read: `event` gets how many reads are left."""
+
+    def __init__(self, streets: list[Sample], reads: int, event: Callable[[int], None]):
+        self.streets, self.reads, self.event = streets, reads, event
+
+    def __len__(self) -> int:
+        return len(self.streets)
+
+    def __getitem__(self, k: int) -> Sample:
+        if k >= len(self.streets):
+            raise IndexError(k)
+        self.event(self.reads)
+        self.reads -= 1
+        return self.streets[k]
+
+
+def kill(reads: int) -> None:
+    """The power fails."""
+    if reads == 0:
+        raise InterruptedError
 
 
 def _street(seed: int) -> Sample:

@@ -194,44 +194,41 @@ def test_clocks_that_are_apart_show_in_the_error(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("changes", "topics", "message"),
+    ("changes", "message"),
     [
-        ({"without": "/odom"}, TOPICS, r"the topic /odom of the type nav_msgs/Odometry .*found only .*/points \(sens"),
-        ({}, TOPICS._replace(points="/odom"), "/odom of the type sensor_msgs/PointCloud2, found .* nav_msgs/Odometry"),
-        ({"without": "/tf_static"}, TOPICS, "the topic /tf_static"),
-        ({"without": "/cam/camera_info"}, TOPICS, "the topic /cam/camera_info"),
-        ({"transforms": ("base_link lidar", "mount optical")}, TOPICS, "a chain .* base_link and optical, .*-> lidar"),
-        ({"base": "rear_axle"}, TOPICS, "/tf_static: expected a chain of fixed transforms between lidar and rear_axle"),
-        ({"base": "optical"}, TOPICS, r"looks ahead, along x of optical, .* found z along \(0.00, 0.00, 1.00\)"),
+        ({"without": "/odom"}, r"the topic /odom of the type nav_msgs/Odometry .*found only .*/points \(sens"),
         (
-            {"base_turn": (180, 0, 0)},
-            TOPICS,
-            r"y axis points down, against z, found .*, y along .*, 1.00\)",
+            {"topics": TOPICS._replace(points="/odom")},
+            "/odom of the type sensor_msgs/PointCloud2, found .* nav_msgs/Odometry",
         ),
-        ({"distortion": 0.1}, TOPICS, r"/cam/image_raw: expected rectified images.*found distortion .*\[0.1"),
-        ({"model": "equidistant"}, TOPICS, "/cam/image_raw: expected rectified images.*found distortion 'equidistant'"),
-        ({"image_topic": RECTIFIED.image, "shift": -2.4}, RECTIFIED, r"the left one of a pair, .* found \[-2.4, 0.0"),
-        ({"scan_stamps": {3: START - 2 * 10**9}}, TOPICS, "/points: expected a clock that isn't set back, found"),
-        ({"empty_scans": tuple(range(N_SCANS))}, TOPICS, "/points: expected two usable messages at least, .* found 0"),
-        ({"n_far": 60}, TOPICS, "/points: expected returns within 250 m, found 60 of 110 beyond: are they metres"),
-        ({"encoding": "mono16"}, TOPICS, "/cam/image_raw: expected images as rgb8, .* JPEG or PNG, found 'mono16'"),
+        ({"without": "/tf_static"}, "the topic /tf_static"),
+        ({"without": "/cam/camera_info"}, "the topic /cam/camera_info"),
+        ({"transforms": ("base_link lidar", "mount optical")}, "a chain .* base_link and optical, .*-> lidar"),
+        ({"base": "rear_axle"}, "/tf_static: expected a chain of fixed transforms between lidar and rear_axle"),
+        ({"base": "optical"}, r"looks ahead, along x of optical, .* found z along \(0.00, 0.00, 1.00\)"),
+        ({"base_turn": (180, 0, 0)}, r"y axis points down, against z, found .*, y along .*, 1.00\)"),
+        ({"distortion": 0.1}, r"/cam/image_raw: expected rectified images.*found distortion .*\[0.1"),
+        ({"model": "equidistant"}, "/cam/image_raw: expected rectified images.*found distortion 'equidistant'"),
         (
-            {"encoding": "png16"},
-            TOPICS,
-            "/cam/image_raw: expected images as .* with 8 bits, found 'png' with pixels 'I",
+            {"topics": RECTIFIED, "image_topic": RECTIFIED.image, "shift": -2.4},
+            r"the left one of a pair, .* found \[-2.4, 0.0",
         ),
-        ({"intensity_scale": -1.0}, TOPICS, "/points: expected a finite brightness from 0 up, found -245 to"),
+        ({"scan_stamps": {3: START - 2 * 10**9}}, "/points: expected a clock that isn't set back, found"),
+        ({"empty_scans": tuple(range(N_SCANS))}, "/points: expected two usable messages at least, .* found 0"),
+        ({"n_far": 60}, "/points: expected returns within 250 m, found 60 of 110 beyond: are they metres"),
+        ({"encoding": "mono16"}, "/cam/image_raw: expected images as rgb8, .* JPEG or PNG, found 'mono16'"),
+        ({"encoding": "png16"}, "/cam/image_raw: expected images as .* with 8 bits, found 'png' with pixels 'I"),
+        ({"intensity_scale": -1.0}, "/points: expected a finite brightness from 0 up, found -245 to"),
         (
-            {"tf_topic": "/tf", "drifting": "base_link mount"},
-            TOPICS._replace(transforms=("/tf",)),
+            {"topics": TOPICS._replace(transforms=("/tf",)), "tf_topic": "/tf", "drifting": "base_link mount"},
             r"/tf: expected a chain of fixed transforms between base_link and optical.* -> mount \(changes\)",
         ),
-        ({"info_size": (24, 80)}, TOPICS, "/cam/camera_info: expected the size of the images .*40 x 12 .*found 80 x"),
+        ({"info_size": (24, 80)}, "/cam/camera_info: expected the size of the images .*40 x 12 .*found 80 x"),
     ],
 )
-def test_what_a_bag_lacks_is_refused_by_name(tmp_path, changes, topics, message):
+def test_what_a_bag_lacks_is_refused_by_name(tmp_path, changes, message):
     with pytest.raises(DataError, match=message):
-        converted(tmp_path, topics=topics, **changes)
+        converted(tmp_path, **changes)
     assert not (tmp_path / "out").exists()
     assert {path.name for path in tmp_path.iterdir()} == {"bag"}  # no half of a drive
 

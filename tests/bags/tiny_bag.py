@@ -15,14 +15,13 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
+from tiny_drive import SIZE, K
 
 START = 1_767_261_600_000_000_000
 """2026-01-01 10:00:00 UTC, nanoseconds."""
 N_SCANS, PERIOD = 6, 100_000_000
 SPEED, TURN = 5.0, 0.2
 """Metres and radians a second."""
-SIZE = (12, 40)
-K = np.array([[20.0, 0.0, 19.5], [0.0, 20.0, 5.5], [0.0, 0.0, 1.0]])
 
 
 def rigid(angles: tuple, shift: tuple) -> np.ndarray:

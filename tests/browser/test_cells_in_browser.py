@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from read_page import decode
+from test_looks_in_browser import PHONE
 from told_story import told_story
 
 from semgrid_edu.datasets.samples import sample_drive, sample_weights
@@ -67,6 +68,13 @@ def rows(page, table: str) -> dict[str, list[float]]:
     return {head: [number(text) for text in cells if text] for head, cells in found}
 
 
+def opened_at(shipped, frame, cell, **options):
+    """Open the page by the address of a cell, whose story it tells."""
+    page = shipped(f"#{frame}/{cell[0]}/{cell[1]}", **options)
+    told(page, cell)
+    return page
+
+
 @pytest.fixture(scope="module")
 def cells(shipped_frames) -> dict[str, tuple[int, int]]:
     """A cell of a car, one of a pedestrian that was not found, and one that nobody has seen."""
@@ -115,8 +123,7 @@ class TestMarks:
             assert centre(mark) == pytest.approx(centre(cell_box(page, other, self.CELL)), abs=1)
 
     def test_arrow_keys_go_from_cell_to_cell(self, shipped, grid):
-        page = shipped(f"#{FRAME}/100/24")
-        told(page, self.CELL)
+        page = opened_at(shipped, FRAME, self.CELL)
         page.locator(f"svg[data-grid={grid}]").focus()
         for key, cell in (("ArrowUp", (99, 24)), ("ArrowRight", (99, 25)), ("ArrowDown", (100, 25))):
             page.keyboard.press(key)
@@ -142,8 +149,7 @@ class TestChosenCells:
 
     @pytest.mark.parametrize(("cell", "key"), [((0, 0), "ArrowUp"), ((141, 61), "ArrowRight")])
     def test_keys_stop_at_the_border(self, shipped, cell, key):
-        page = shipped(f"#0/{cell[0]}/{cell[1]}")
-        told(page, cell)
+        page = opened_at(shipped, 0, cell)
         page.locator("svg[data-grid=grid]").focus()
         page.keyboard.press(key)
         page.wait_for_timeout(300)
@@ -174,8 +180,7 @@ class TestChosenCells:
         assert page.locator(".mark").count() == 0
 
     def test_the_mark_stays_on_its_place_until_that_leaves_the_map(self, shipped, shipped_frames):
-        page = shipped("#0/120/40")
-        told(page, (120, 40))
+        page = opened_at(shipped, 0, (120, 40))
         for k, view in enumerate(shipped_frames[:10]):
             page.locator("#slider").fill(str(k))
             then, now = (np.array(shipped_frames[i]["pose"]) for i in (0, k))
@@ -294,8 +299,7 @@ class TestStory:
 
 
 def test_while_the_drive_plays_the_neighbours_wait_until_it_is_paused(shipped):
-    page = shipped(f"#{FRAME}/100/24", by_hand=True)
-    told(page, (100, 24))
+    page = opened_at(shipped, FRAME, (100, 24), by_hand=True)
     page.locator("#play").click()
     page.clock.run_for(120)
     page.locator("#telling", has_text="when the drive is paused").wait_for()
@@ -328,14 +332,12 @@ class TestTogether:
         assert page.locator("#brief p").first.inner_text() == page.locator("#telling > p").first.inner_text()
 
     def test_cells_have_four_pixels_and_the_panel_no_scroller(self, shipped):
-        page = shipped(f"#{FRAME}/100/24")
-        told(page, self.CELL)
+        page = opened_at(shipped, FRAME, self.CELL)
         assert min(cell_box(page, grid, self.CELL)["width"] for grid in GRIDS) >= 4
         assert page.locator(".story").evaluate("(one) => one.scrollHeight <= one.clientHeight + 1")
 
     def test_a_phone_shows_the_points_in_an_inset(self, shipped):
-        page = shipped(f"#{FRAME}/100/24", viewport={"width": 390, "height": 844}, is_mobile=True, has_touch=True)
-        told(page, self.CELL)
+        page = opened_at(shipped, FRAME, self.CELL, **PHONE)
         page.locator("svg[data-grid=refined]").scroll_into_view_if_needed()
         inset = page.locator("#inset")
         assert in_sight(page, inset)
@@ -345,8 +347,7 @@ class TestTogether:
 
     @pytest.mark.parametrize("place", ["h1", ".story", ".tables"])
     def test_no_inset_lies_over_a_phones_text_but_beside_the_grids(self, shipped, place):
-        page = shipped(f"#{FRAME}/100/24", viewport={"width": 390, "height": 844}, is_mobile=True, has_touch=True)
-        told(page, self.CELL)
+        page = opened_at(shipped, FRAME, self.CELL, **PHONE)
         page.locator(place).evaluate("(one) => one.scrollIntoView({ block: 'start' })")
         assert not in_sight(page, page.locator("#inset"))
 
@@ -400,8 +401,7 @@ class TestZoom:
     CELL = (60, 50)
 
     def test_cells_grow_around_the_chosen_one(self, shipped, factor):
-        page = shipped(f"#{FRAME}/{self.CELL[0]}/{self.CELL[1]}")
-        told(page, self.CELL)
+        page = opened_at(shipped, FRAME, self.CELL)
         before = cell_box(page, "grid", self.CELL)["width"]
         page.locator("#zoom").select_option(str(factor))
         box = cell_box(page, "grid", self.CELL)
@@ -411,8 +411,7 @@ class TestZoom:
         assert svg["y"] < centre(box)[1] < svg["y"] + svg["height"]
 
     def test_the_numbers_of_the_axes_stand_at_their_cells(self, shipped, factor):
-        page = shipped(f"#{FRAME}/{self.CELL[0]}/{self.CELL[1]}")
-        told(page, self.CELL)
+        page = opened_at(shipped, FRAME, self.CELL)
         page.locator("#zoom").select_option(str(factor))
         page.locator("svg[data-grid=grid]").evaluate("(svg) => svg.scrollIntoView({ block: 'center' })")
         raster = cell_box(page, "grid", (0, 0))
@@ -423,8 +422,7 @@ class TestZoom:
             assert centre(one.bounding_box())[1] == pytest.approx(raster["y"] + ahead * raster["height"], abs=4)
 
     def test_the_pointer_finds_the_name_of_its_cell(self, shipped, shipped_frames, factor):
-        page = shipped(f"#{FRAME}/{self.CELL[0]}/{self.CELL[1]}")
-        told(page, self.CELL)
+        page = opened_at(shipped, FRAME, self.CELL)
         page.locator("#zoom").select_option(str(factor))
         for cell in (self.CELL, (self.CELL[0] + 4, self.CELL[1] - 3), (self.CELL[0] - 5, self.CELL[1] + 2)):
             page.mouse.move(*point_at(page, "grid", cell))

@@ -2,8 +2,10 @@
 
 import gzip
 import json
+import os
 import pickle
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +23,6 @@ from tiny_pandaset import (
     SCENE,
     STEP,
     WALL,
-    pickled_table,
     write_table,
     write_tiny_pandaset,
 )
@@ -281,84 +282,74 @@ def test_a_scene_is_named_by_text(root, scene):
         PandasetScene(root, scene)
 
 
-def gone(name):
-    return lambda folder: (folder / name).unlink()
+def written(content):
+    return lambda path: path.write_bytes(content)
 
 
-def written(name, content):
-    return lambda folder: (folder / name).write_bytes(content)
+def table(**columns):
+    return lambda path: write_table(path, columns)
 
 
-def column(name, key, values):
+def column(key, values):
     """Write a table again, with other values in one column."""
-    return lambda folder: write_table(folder / name, read_pickled_table(folder / name).columns | {key: values})
+    return lambda path: write_table(path, read_pickled_table(path).columns | {key: values})
 
 
-def shortened(name):
-    return lambda folder: (folder / name).write_bytes((folder / name).read_bytes()[:-40])
-
-
-def relabelled(folder):
-    path = folder / "annotations/semseg/02.pkl.gz"
-    write_table(path, {"class": read_pickled_table(path).columns["class"] + 92})
-
+SCAN, CLASSES, CUBOIDS = (f"{name}/02.pkl.gz" for name in ("lidar", "annotations/semseg", "annotations/cuboids"))
+POSES, CAMERA = "lidar/poses.json", "camera/front_camera"
+NOWHERE = dict.fromkeys("yzid", np.zeros(3)) | {"x": np.array([0.0, 0.0, 9e5])}
 
 BAD = {
-    "missing poses": (gone("lidar/poses.json"), r"lidar/poses\.json: expected a file"),
-    "missing poses of the camera": (
-        gone("camera/front_camera/poses.json"),
-        r"front_camera/poses\.json: expected a file",
-    ),
-    "too few poses": (written("lidar/poses.json", b"[]"), r"lidar/poses\.json: expected at least 5 poses.*found 0"),
-    "a pose of something else": (written("lidar/poses.json", b"[1, 2, 3, 4, 5]"), r"poses\.json: expected poses of"),
-    "times without end": (
-        written("lidar/timestamps.json", b"[1, 2, 3, 4, Infinity]"),
-        r"timestamps\.json: expected 5 finite times",
-    ),
-    "no intrinsics": (written("camera/front_camera/intrinsics.json", b'{"fx": 1}'), r"intrinsics\.json: expected the"),
-    "an image cut short": (shortened("camera/front_camera/02.jpg"), r"02\.jpg: expected a sound JPEG"),
+    "missing poses": (POSES, Path.unlink, "a file"),
+    "missing poses of the camera": (f"{CAMERA}/poses.json", Path.unlink, "a file"),
+    "too few poses": (POSES, written(b"[]"), "at least 5 poses.*found 0"),
+    "a pose of something else": (POSES, written(b"[1, 2, 3, 4, 5]"), "poses of"),
+    "times without end": ("lidar/timestamps.json", written(b"[1, 2, 3, 4, Infinity]"), "5 finite times"),
+    "no intrinsics": (f"{CAMERA}/intrinsics.json", written(b'{"fx": 1}'), "the"),
+    "an image cut short": (f"{CAMERA}/02.jpg", lambda path: os.truncate(path, 1000), "a sound JPEG"),
     "labels of another length": (
-        lambda folder: write_table(folder / "annotations/semseg/02.pkl.gz", {"class": np.full(7, 7)}),
-        r"semseg/02\.pkl\.gz: expected a class for each of the scan's \d+ returns, found 7",
+        CLASSES,
+        table(**{"class": np.full(7, 7)}),
+        r"a class for each of the scan's \d+ returns, found 7",
     ),
-    "unknown classes": (relabelled, r"semseg/02\.pkl\.gz: expected labels among"),
-    "another table": (written("lidar/02.pkl.gz", gzip.compress(pickled_table({"a": [1.0]}))), "expected the columns x"),
+    "unknown classes": (
+        CLASSES,
+        lambda path: write_table(path, {"class": read_pickled_table(path).columns["class"] + 92}),
+        "labels among",
+    ),
+    "another table": (SCAN, table(a=[1.0]), "the columns x"),
     "a place that is nowhere": (
-        column("annotations/cuboids/02.pkl.gz", "position.x", np.array([0.0, np.nan])),
-        r"cuboids/02\.pkl\.gz: expected finite numbers in the column position\.x",
+        CUBOIDS,
+        column("position.x", np.array([0.0, np.nan])),
+        r"finite numbers in the column position\.x",
     ),
-    "a name that is a number": (
-        column("annotations/cuboids/02.pkl.gz", "uuid", np.array([1, 2])),
-        r"cuboids/02\.pkl\.gz: expected text in the columns uuid",
-    ),
-    "neither true nor false": (
-        column("annotations/cuboids/02.pkl.gz", "stationary", ["no", "yes"]),
-        r"cuboids/02\.pkl\.gz: expected true or false in the column stationary",
-    ),
+    "a name that is a number": (CUBOIDS, column("uuid", np.array([1, 2])), "text in the columns uuid"),
+    "neither true nor false": (CUBOIDS, column("stationary", ["no", "yes"]), "true or false in the column stationary"),
     "a box that is turned inside out": (
-        column("annotations/cuboids/02.pkl.gz", "dimensions.x", np.array([2.0, -2.0])),
-        r"cuboids/02\.pkl\.gz: expected dimensions from 0 m up, found -2 m",
+        CUBOIDS,
+        column("dimensions.x", np.array([2.0, -2.0])),
+        "dimensions from 0 m up, found -2 m",
     ),
     "a return at the end of the world": (
-        lambda folder: write_table(
-            folder / "lidar/02.pkl.gz", dict.fromkeys("yzid", np.zeros(3)) | {"x": np.array([0.0, 0.0, 9e5])}
-        ),
-        r"lidar/02\.pkl\.gz: expected returns within 1000 m .* found \[900000\.0, 0\.0, 0\.0\] in row 2",
+        SCAN,
+        table(**NOWHERE),
+        r"returns within 1000 m .* found \[900000\.0, 0\.0, 0\.0\] in row 2",
     ),
     "too much light": (
-        lambda folder: write_table(folder / "lidar/02.pkl.gz", dict.fromkeys("xyzid", np.array([3.0, 256.0]))),
-        r"lidar/02\.pkl\.gz: expected i from 0 to 255, found 3 to 256",
+        SCAN,
+        table(**dict.fromkeys("xyzid", np.array([3.0, 256.0]))),
+        "i from 0 to 255, found 3 to 256",
     ),
-    "a hostile scan": (written("lidar/02.pkl.gz", gzip.compress(pickle.dumps(print))), r"names builtins\.print"),
+    "a hostile scan": (SCAN, written(gzip.compress(pickle.dumps(print))), r".*names builtins\.print"),
 }
 
 
 @pytest.mark.parametrize("kind", BAD)
 def test_bad_inputs_are_named(copy, kind):
-    spoil, says = BAD[kind]
-    spoil(copy / SCENE)
+    file, spoil, says = BAD[kind]
+    spoil(copy / SCENE / file)
     scene = PandasetScene(copy, SCENE)
-    with pytest.raises(DataError, match=says):
+    with pytest.raises(DataError, match=f"{file}: expected {says}"):
         _ = scene[1]
     assert scene.problems()
 

@@ -87,20 +87,13 @@ def test_a_missing_or_damaged_excerpt_is_named(tmp_path, content):
 
 
 @pytest.mark.parametrize("segmenter", trained_segmenters())
-def test_the_shipped_networks_know_the_shipped_frames(segmenter):
+def test_the_shipped_networks_and_image_networks_know_the_shipped_frames(segmenter):
     """They come from their training split; a frame's commonest class fills at most six cells in ten."""
-    net, frames = load_net(sample_weights(segmenter), sample_drive().camera), sample_frames()
-    assert len(frames) == 6
-    for sample in frames:
-        with torch.inference_mode():
-            predicted = net(sample.image[None] / 255, sample.occupancy[None])[0].argmax(0)
-        assert (predicted == sample.truth).float().mean() > 0.75
-
-
-@pytest.mark.parametrize("segmenter", trained_segmenters())
-def test_the_shipped_image_networks_know_the_shipped_images(segmenter):
-    net = load_net(sample_image_stage(segmenter), sample_drive().camera)
+    net, image_stage = (load_net(of(segmenter), sample_drive().camera) for of in (sample_weights, sample_image_stage))
+    assert len(sample_frames()) == 6
     for sample in sample_frames():
+        image = sample.image[None] / 255
         with torch.inference_mode():
-            predicted = net.segmenter(sample.image[None] / 255)[0].argmax(0)
-        assert (predicted == sample.labels).float().mean() > 0.7
+            cells, pixels = net(image, sample.occupancy[None])[0].argmax(0), image_stage.segmenter(image)[0].argmax(0)
+        assert (cells == sample.truth).float().mean() > 0.75
+        assert (pixels == sample.labels).float().mean() > 0.7

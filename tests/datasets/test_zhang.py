@@ -140,28 +140,18 @@ class TestTrackingRun:
             expected[0, 3] += 1
 
     @pytest.mark.parametrize(
-        ("file", "old", "new", "message"),
+        ("folder", "old", "new", "message"),
         [
-            (
-                "calib/0009.txt",
-                "Tr_velo_cam",
-                "Tr_velo",
-                r"expected the key Tr_velo_cam, found the keys P0, .*Tr_velo,",
-            ),
-            ("calib/0009.txt", "R_rect 1", "R_rect 2", "expected a rotation matrix for R_rect"),
-            ("calib/0009.txt", "P2: 2", "P2: 2 2", "expected 12 numbers for P2, found 13"),
-            (
-                "calib/0009.txt",
-                "Tr_velo_cam",
-                "Tr",
-                "expected the key Tr_imu_velo, found a calibration of the odometry",
-            ),
-            ("oxts/0009.txt", "\n", "\n\n", "expected 2 lines, one per frame, found 4"),
-            ("oxts/0009.txt", "49.0", "449.0", "expected latitude and longitude in degrees"),
+            ("calib", "Tr_velo_cam", "Tr_velo", "expected the key Tr_velo_cam, found the keys P0, .*Tr_velo,"),
+            ("calib", "Tr_velo_cam", "Tr", "expected the key Tr_imu_velo, found a calibration of the odometry"),
+            ("calib", "R_rect 1", "R_rect 2", "expected a rotation matrix for R_rect"),
+            ("calib", "P2: 2", "P2: 2 2", "expected 12 numbers for P2, found 13"),
+            ("oxts", "\n", "\n\n", "expected 2 lines, one per frame, found 4"),
+            ("oxts", "49.0", "449.0", "expected latitude and longitude in degrees"),
         ],
     )
-    def test_damage_is_named(self, tmp_path, file, old, new, message):
-        path = write_run(tmp_path) / "training" / file
+    def test_damage_is_named(self, tmp_path, folder, old, new, message):
+        path = write_run(tmp_path) / "training" / folder / "0009.txt"
         assert old in path.read_text()
         path.write_text(path.read_text().replace(old, new))
         with pytest.raises(DataError, match=f"0009.txt: {message}"):

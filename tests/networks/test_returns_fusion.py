@@ -3,20 +3,19 @@
 from dataclasses import replace
 
 import pytest
+import tiny_streets
 import torch
 from safetensors import safe_open
 
 from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.fast import with_fast_sampler
-from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.networks import Architecture, SemanticGridNet, build_net, save_net
+from semgrid_edu.networks import SemanticGridNet, build_net, save_net
 from semgrid_edu.planes import above_ground, pick_planes
 from semgrid_edu.training.batches import Batch, grid_logits, image_scores
 
-GRID = GridSpec(2, 26, -6, 6, 1.0)
-SMALL = Architecture(image_size=(24, 80), grid=GRID, heights=(0.0, 0.5, 1.0), uses_return_heights=True)
+SMALL = replace(tiny_streets.SMALL, uses_return_heights=True)
 
 
 @pytest.fixture

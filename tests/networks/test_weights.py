@@ -3,6 +3,7 @@ from dataclasses import replace
 
 import pytest
 import torch
+from safetensors import safe_open
 from safetensors.torch import load_file, save_file
 
 from semgrid_edu.datasets.samples import sample_weights
@@ -38,6 +39,11 @@ def _inputs(architecture):
     rng = torch.Generator().manual_seed(0)
     image = torch.rand(1, 3, *architecture.image_size, generator=rng)
     return image, torch.rand(1, 4, *architecture.grid.shape, generator=rng)
+
+
+def _header(path):
+    with safe_open(path, "pt") as file:
+        return file.metadata()
 
 
 def _rewrite(path, change_tensors=lambda t: t, header=None):
@@ -116,26 +122,8 @@ def test_a_network_made_by_hand_is_saved_with_the_architecture_it_was_given(net,
     assert torch.equal(load_net(tmp_path / "net.safetensors", camera)(*_inputs(SMALL)), net(*_inputs(SMALL)))
 
 
-def test_weights_of_another_architecture_are_refused(saved, camera):
-    wide = json.dumps({**_header(SMALL), "heights": [0.0, 0.5]})
-    _rewrite(saved, header={"architecture": wide})
-    with pytest.raises(DataError, match=r"\(16, 14, 2, 1, 1\) for fusion.reduce.0.weight, found \(16, 14, 3, 1, 1\)"):
-        load_net(saved, camera)
-
-
-def _header(architecture):
-    return {
-        "segmenter": architecture.segmenter,
-        "preset": architecture.preset,
-        "label_set": architecture.label_set,
-        "image_size": list(architecture.image_size),
-        "grid": vars(architecture.grid),
-        "heights": list(architecture.heights),
-    }
-
-
 def test_a_missing_or_extra_tensor_is_refused(saved, camera):
-    header = {"architecture": json.dumps(_header(SMALL))}
+    header = _header(saved)
     _rewrite(saved, lambda t: {**t, "more": torch.zeros(2)}, header)
     with pytest.raises(DataError, match=r"expected nothing for more, found \(2,\)"):
         load_net(saved, camera)
@@ -144,15 +132,9 @@ def test_a_missing_or_extra_tensor_is_refused(saved, camera):
         load_net(saved, camera)
 
 
-@pytest.mark.parametrize(
-    "header",
-    [
-        {"architecture": "no json"},
-        {"architecture": json.dumps({**_header(SMALL), "more": 1})},
-        {"architecture": json.dumps({**_header(SMALL), "heights": ["low"]})},
-    ],
-)
-def test_a_header_of_another_program_is_refused(saved, camera, header):
-    _rewrite(saved, header=header)
+@pytest.mark.parametrize("changed", ["no json", {"more": 1}, {"heights": ["low"]}])
+def test_a_header_of_another_program_is_refused(saved, camera, changed):
+    text = changed if isinstance(changed, str) else json.dumps(json.loads(_header(saved)["architecture"]) | changed)
+    _rewrite(saved, header={"architecture": text})
     with pytest.raises(DataError, match="the architecture of a network in the header"):
         load_net(saved, camera)

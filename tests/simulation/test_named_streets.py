@@ -103,11 +103,8 @@ def test_the_gaps_of_a_convoy_are_8_to_20_metres():
     offenders = []
     for seed in SEEDS:
         drive = simulate(seed, 36, "convoy")
-        road, actors, pairs = (
-            drive.plan.road,
-            {actor.instance: actor for actor in drive.moving},
-            convoy_pairs(drive.moving),
-        )
+        road, pairs = drive.plan.road, convoy_pairs(drive.moving)
+        actors = {actor.instance: actor for actor in drive.moving}
         assert pairs
         for t, (ahead, follower) in product((0.0, 3.0), pairs):
             a, b = actors[ahead], actors[follower]

@@ -9,7 +9,7 @@ from tiny_streets import CAMERA
 from typer.testing import CliRunner
 
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
-from semgrid_edu.datasets.training_set import Sample
+from semgrid_edu.datasets.samples import sample_frames
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.labels import KITTI_14, SYNTHIA_10
 from semgrid_edu.networks import Architecture, build_net, load_net, save_net
@@ -23,41 +23,27 @@ from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.flaws import TruthFlaws
 
 
-class _Noise:
-    """Six frames of noise, in the place of a data set on disk."""
+class _Frames(list):
+    """The six shipped frames, in the place of a data set on disk."""
 
     label_set = KITTI_14
     camera = CAMERA.resized(Architecture().image_size)
 
     def __init__(self, dataset_dir, split, spec, image_size, truth):
         assert split == "train"
+        super().__init__(sample_frames())
         self.truth = truth
         self.gaps_filled = False
-        self.rng = torch.Generator().manual_seed(0)
 
     def with_gaps_filled(self):
         self.gaps_filled = True
         return self
 
-    def __len__(self):
-        return 6
-
-    def __getitem__(self, k):
-        if k >= len(self):
-            raise IndexError(k)
-        size, shape = Architecture().image_size, Architecture().grid.shape
-        image, labels = (
-            torch.randint(high, (*channels, *size), generator=self.rng) for high, channels in ((256, (3,)), (10, ()))
-        )
-        occupancy = torch.rand(4, *shape, generator=self.rng).softmax(0)
-        truth = torch.randint(14, shape, generator=self.rng)
-        return Sample(image.to(torch.uint8), labels.to(torch.uint8), occupancy, truth.to(torch.uint8))
-
 
 @pytest.fixture(autouse=True)
 def in_the_place_of_a_data_set(monkeypatch):
-    """Frames of noise, of which no doubt can be told."""
-    monkeypatch.setattr(experiment.TrainingSet, "by_camera", lambda *args, **named: [_Noise(*args, **named)])
+    """Frames of which no doubt can be told."""
+    monkeypatch.setattr(experiment.TrainingSet, "by_camera", lambda *args, **named: [_Frames(*args, **named)])
     monkeypatch.setattr(dataset_doubts, "dataset_doubts", lambda *_: [])
 
 
@@ -92,13 +78,13 @@ def test_the_command_leaves_weights_log_and_provenance(data):
     assert provenance["dataset"] == sha256(data / "dataset.json")
     assert "truth" not in provenance
     assert len((out / "log.csv").read_text().splitlines()) == 3
-    assert isinstance(load_net(out / "weights.safetensors", _Noise.camera).segmenter, Fcn)
+    assert isinstance(load_net(out / "weights.safetensors", _Frames.camera).segmenter, Fcn)
 
 
 def test_a_network_gets_the_classes_of_its_data(monkeypatch, data):
     """minisynthia has ten classes and no unknown ones; networks have KITTI-14 by default."""
     built = {}
-    monkeypatch.setattr(_Noise, "label_set", SYNTHIA_10)
+    monkeypatch.setattr(_Frames, "label_set", SYNTHIA_10)
     monkeypatch.setattr(experiment, "build_net", lambda description, *_: built.update(net=description) or _Net)
     monkeypatch.setattr(experiment, "train", lambda *_: None)
     trained(data, "--iterations", 1)
@@ -148,7 +134,7 @@ def test_the_options_reach_the_training(monkeypatch, data, truth):
 @pytest.mark.parametrize("members", [1, 2])
 def test_a_network_starts_from_another_and_says_so(monkeypatch, data, tmp_path, members):
     first = tmp_path / "first.safetensors"
-    save_net(start := build_net(Architecture(n_segmenters=members), _Noise.camera, seed=5), first)
+    save_net(start := build_net(Architecture(n_segmenters=members), _Frames.camera, seed=5), first)
     monkeypatch.setattr(experiment, "train", lambda net, *_: built.update(net.state_dict()))
     built = {}
     provenance = trained(data, "--data", data, "--from", first)
@@ -161,7 +147,7 @@ def test_a_network_starts_from_another_and_says_so(monkeypatch, data, tmp_path, 
 
 def test_the_mean_of_several_networks_starts_from_them_and_only_its_fusion_learns(monkeypatch, data, tmp_path):
     files = [tmp_path / f"{seed}.safetensors" for seed in (5, 6)]
-    starts = [build_net(Architecture(), _Noise.camera, seed=seed).eval() for seed in (5, 6)]
+    starts = [build_net(Architecture(), _Frames.camera, seed=seed).eval() for seed in (5, 6)]
     for start, file in zip(starts, files, strict=True):
         save_net(start, file)
     given = {}

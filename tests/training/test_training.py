@@ -12,7 +12,7 @@ import torch.nn.functional as F
 from lightning_fabric import Fabric
 from safetensors.torch import load_file
 from sklearn.metrics import accuracy_score
-from tiny_streets import CAMERA, SMALL, tiny_streets
+from tiny_streets import CAMERA, SMALL, Watched, kill, tiny_streets
 
 from semgrid_edu.datasets.training_set import Mixture
 from semgrid_edu.errors import ArgumentError, DataError
@@ -313,33 +313,6 @@ def test_a_batch_without_labels_teaches_nothing(streets, tmp_path):
     assert (loss[~unlabelled] > 0).all()
 
 
-class _KilledError(Exception):
-    pass
-
-
-class _Watched:
-    """Streets, and what happens as they are read: `event` gets how many reads are left."""
-
-    def __init__(self, streets, reads, event):
-        self.streets, self.reads, self.event = streets, reads, event
-
-    def __len__(self):
-        return len(self.streets)
-
-    def __getitem__(self, k):
-        if k >= len(self.streets):
-            raise IndexError(k)
-        self.event(self.reads)
-        self.reads -= 1
-        return self.streets[k]
-
-
-def _kill(reads):
-    """The power fails."""
-    if reads == 0:
-        raise _KilledError
-
-
 def _same_files(first, second):
     assert {path.name for path in first.iterdir()} == {path.name for path in second.iterdir()} == ENDED
     for name in ENDED:
@@ -365,7 +338,7 @@ def test_a_resumed_run_ends_with_the_same_bytes(streets, tmp_path, monkeypatch, 
         if steps in killed_after and not begins:
             shutil.copytree(whole, tmp_path / killed_after[steps])
 
-    train(build_net(SMALL, CAMERA, seed=1), _Watched(streets, last, keep), whole, params, seed=1)
+    train(build_net(SMALL, CAMERA, seed=1), Watched(streets, last, keep), whole, params, seed=1)
     for broken in (tmp_path / when for when in killed_after.values()):
         assert (broken / "checkpoint.safetensors").exists()
         train(build_net(SMALL, CAMERA, seed=9), streets, broken, params, seed=1, resume=True)
@@ -457,8 +430,8 @@ def _killed(streets, folder, monkeypatch, architecture=SMALL):
     """A training that was killed in its fourth step and has kept a checkpoint after two."""
     monkeypatch.setattr(training, "CHECKPOINT_EVERY", 2)
     reads = 3 * len(streets) + 3 * QUICK.batch_size
-    with pytest.raises(_KilledError):
-        train(build_net(architecture, CAMERA), _Watched(streets, reads, _kill), folder, QUICK)
+    with pytest.raises(InterruptedError):
+        train(build_net(architecture, CAMERA), Watched(streets, reads, kill), folder, QUICK)
 
 
 def test_only_its_own_run_is_resumed(streets, tmp_path, monkeypatch):
@@ -509,7 +482,7 @@ def test_a_full_disk_keeps_the_checkpoint_before(streets, tmp_path, monkeypatch)
             resource.setrlimit(resource.RLIMIT_FSIZE, (len(kept[0]), hard))
 
     kept = []
-    watched = _Watched(streets, 3 * len(streets) + 2 * QUICK.batch_size, fill)
+    watched = Watched(streets, 3 * len(streets) + 2 * QUICK.batch_size, fill)
     try:
         with pytest.raises(OSError, match="File too large") as caught:
             train(build_net(SMALL, CAMERA), watched, broken, QUICK)
