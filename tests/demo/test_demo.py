@@ -185,8 +185,7 @@ def test_times_are_medians_of_the_stages():
 @pytest.fixture(scope="module")
 def remembering(drive, weights, tmp_path_factory):
     folder = tmp_path_factory.mktemp("memory")
-    root = str(drive.folder.parents[1])
-    arguments = ["--kitti", root, "--date", DATE, "--drive", "0001", "--weights", str(weights), "--memory"]
+    arguments = [str(drive.folder), "--weights", str(weights), "--memory"]
     result = CliRunner().invoke(app, ["demo", *arguments, "--out", str(folder)])
     assert result.exit_code == 0, result.exception
     return folder
@@ -363,16 +362,6 @@ class TestPanels:
 
 @pytest.mark.usefixtures("no_overview")
 class TestMistakes:
-    def test_an_unknown_drive_is_named(self, drive):
-        root = drive.folder.parents[1]
-        result = CliRunner().invoke(app, ["demo", "--kitti", str(root), "--date", DATE, "--drive", "0042"])
-        assert isinstance(result.exception, DataError)
-        assert "drive_0042" in str(result.exception)
-
-    def test_half_a_name_is_refused(self):
-        result = CliRunner().invoke(app, ["demo", "--date", DATE])
-        assert isinstance(result.exception, ArgumentError)
-
     def test_a_failed_run_leaves_no_page(self, weights, tmp_path):
         folder = write_tiny_drive(tmp_path)
         (folder / "velodyne_points" / "data" / "0000000000.bin").write_bytes(b"\0" * 7)
@@ -440,8 +429,7 @@ class TestChoice:
         assert "(one in 2 of frames 0 to 4; it has 6)" in html
 
     def test_another_network_is_taken_and_one_of_the_image_stage_refused(self, drive, tmp_path):
-        root = str(drive.folder.parents[1])
-        options = ["demo", "--kitti", root, "--date", DATE, "--drive", "0001", "--out", str(tmp_path), "--frames", ":1"]
+        options = ["demo", str(drive.folder), "--out", str(tmp_path), "--frames", ":1"]
         stage = CliRunner().invoke(app, [*options, "--weights", str(sample_image_stage("fcn"))])
         assert "image stage" in str(stage.exception)
         result = CliRunner().invoke(app, [*options, "--weights", str(sample_weights("fcn"))])

@@ -18,7 +18,7 @@ from semgrid_edu.storage.files import sha256, write_text
 from semgrid_edu.storage.provenance import provenance_problems
 from semgrid_edu.training.log import LOG, Step, append_step, begin_log
 from semgrid_edu.workshop import training_run as experiment
-from semgrid_edu.workshop.commands import dataset_doubts
+from semgrid_edu.workshop.commands import main
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.flaws import TruthFlaws
 
@@ -65,7 +65,7 @@ def one_camera(*arguments, **named):
 @pytest.fixture(autouse=True)
 def data_without_doubts(monkeypatch):
     """The data set isn't on disk, so nothing can be asked of it."""
-    monkeypatch.setattr(dataset_doubts, "dataset_doubts", lambda *_: [])
+    monkeypatch.setattr(main, "dataset_doubts", lambda *_: [])
 
 
 class _Net:
