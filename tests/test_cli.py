@@ -30,7 +30,6 @@ def test_one_doubt_too_many_is_told_as_such(capsys):
     [
         (["data", "make", "sample", "FILE"], r"FILE.*: expected a folder, found the file .*FILE"),
         (["demo", "--out", "FILE"], r"FILE: expected a folder, found the file .*FILE"),
-        (["demo", "--kitti", "FILE"], r"--kitti, --date, --drive: expected all three or none, found only --kitti"),
         (["data", "verify", "FILE"], r"FILE: expected folders of samples"),
         (
             ["evaluate", "--data", ".", "--weights", ".", "--out", "FILE/scores.json"],
@@ -143,7 +142,7 @@ def test_ctrl_c_says_what_to_run(arguments, module, name, told, monkeypatch, tmp
     monkeypatch.chdir(tmp_path)
     (tmp_path / "DATA").mkdir()
     (tmp_path / "DATA" / "dataset.json").write_text('{"name": "a", "label_set": "KITTI-14", "splits": {}}')
-    monkeypatch.setattr(semgrid_edu.workshop.commands.dataset_doubts, "dataset_doubts", lambda *_: [])
+    monkeypatch.setattr(semgrid_edu.workshop.commands.main, "dataset_doubts", lambda *_: [])
     monkeypatch.setattr(module, name, interrupted)
     monkeypatch.setattr("sys.argv", ["semgrid-edu", *arguments.split()])
     with pytest.raises(SystemExit, match=f"^semgrid-edu: interrupted; run the same command again{told}$"):
@@ -170,8 +169,8 @@ def test_workers_end_without_a_word_when_their_command_is_stopped(tmp_path, sent
 def test_a_script_without_a_main_guard_is_told_so(tmp_path):
     script = tmp_path / "mine.py"
     script.write_text(
-        "from semgrid_edu.workshop.workplace import worker_pool\n"
-        "with worker_pool(1) as pool: pool.submit(abs, 1).result()"
+        "from semgrid_edu.workshop.workplace import workplace\n"
+        "with workplace(1) as place: place.executor.submit(abs, 1).result()"
     )
     ended = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=False)
     assert ended.returncode

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from semgrid_edu import plotting
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Belief, Evidence, FilterState, State
+from semgrid_edu.plotting.animations import wheel_colours
 from semgrid_edu.plotting.colours import HEADING_COLOURS, colour_patches
 from semgrid_edu.plotting.grids import draw_map
-from semgrid_edu.plotting.moving import wheel_colours
 from worlds.lecture_04_cmcdot import SamplingError
 from worlds.lecture_04_crossing import CAR, PARAMS, PERSON, SPEC, crossing, watch
 

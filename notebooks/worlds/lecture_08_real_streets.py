@@ -27,8 +27,7 @@ from semgrid_edu.storage.files import check_writable, sha256, table_beside, writ
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training.devices import open_fabric
-from semgrid_edu.workshop.scoring.confusions import FrameConfusions
-from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids, reliability_of_sums
+from semgrid_edu.workshop.scoring.confusions import FrameConfusions, GridCounts, count_grids, reliability_of_sums
 from semgrid_edu.workshop.scoring.grids import NETWORK, crf_refinement, majority_by_state, network_grids
 from semgrid_edu.workshop.scoring.score_with_interval import (
     compared,

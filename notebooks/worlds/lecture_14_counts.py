@@ -14,8 +14,13 @@ from semgrid_edu.metrics import METRICS, confusion_matrix
 from semgrid_edu.occupancy import PlanarMotion
 from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.workshop.course.street import cells_seen, frames_since_seen
-from semgrid_edu.workshop.scoring.confusions import BANDS, band_names
-from semgrid_edu.workshop.scoring.counting import distance_bands, reliability_of_sums, reliability_sums
+from semgrid_edu.workshop.scoring.confusions import (
+    BANDS,
+    band_names,
+    distance_bands,
+    reliability_of_sums,
+    reliability_sums,
+)
 from semgrid_edu.workshop.scoring.score_with_interval import (
     compared,
     markdown_table,

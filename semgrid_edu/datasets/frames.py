@@ -1,11 +1,12 @@
-"""What all readers of drives share: labelled drives, frames read on demand, KITTI's scans (section 4)."""
+"""What all readers of drives share: frames read on demand, KITTI's scans, tables of classes (section 4)."""
 
 import operator
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Protocol, overload
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,75 +24,65 @@ LIDAR_RANGE = 250.0
 """Largest coordinate of a return, metres. KITTI's HDL-64E sees 120 m, so anything twice as far isn't a measurement."""
 
 
-class LabelledDrive(Protocol):
-    """What training and scoring need from a drive: frames, and the truth of some of them.
+@dataclass(frozen=True)
+class ClassTable:
+    """A table from the class numbers in another data set's files to the classes of a label set.
 
-    Derive a reader from `FrameSequence`, which implements most of it.
-
-    Attributes
+    Parameters
     ----------
-    name : str
-        Identifies the drive in its data set.
-    camera : Camera
-        The calibration, the same for all frames.
     label_set : LabelSet
-        The classes of image labels and truth.
+        The classes to translate to.
+    names : dict of int to (str or None)
+        The class of each number that may occur in the files; None for unlabelled.
+
+    Examples
+    --------
+    >>> from semgrid_edu.labels import KITTI_14
+    >>> ClassTable(KITTI_14, {0: None, 7: "road"}).classes(Path("a.png"), np.array([7, 0]))
+    array([  0, 255], dtype=uint8)
     """
 
-    name: str
-    camera: Camera
     label_set: LabelSet
+    names: dict[int, str | None]
 
-    def __len__(self) -> int:
-        """Return the number of frames."""
-
-    def __getitem__(self, k: int) -> Frame:
-        """Return frame k; the labelled ones have an image and its labels."""
-
-    def truth(self, k: int, spec: GridSpec) -> NDArray[np.uint8]:
-        """Return the class of each cell at frame k, (H, W); 255 where nothing is known.
+    def classes(self, path: Path, numbers: NDArray) -> NDArray[np.uint8]:
+        """Translate the numbers of a file.
 
         Parameters
         ----------
-        k : int
-            Number of a labelled frame.
-        spec : GridSpec
-            The grid, (H, W) cells.
+        path : Path
+            Where the numbers come from, for the error.
+        numbers : (...) int
+            The numbers in the file.
+
+        Returns
+        -------
+        (...) uint8
+            Classes of the label set; 255 where unlabelled.
         """
-
-    def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
-        """Return the cells in view of the camera when the labels have gaps, (H, W); no cell when they have none.
-
-        In these cells 255 in `truth` means that the camera may see something unlabelled, so training ignores them. The
-        other unlabelled cells become unknown classes, even where a LIDAR saw more. Parameters are those of
-        `LabelledDrive.truth`.
-        """
-
-    def image_labels(self, k: int, size: tuple[int, int]) -> NDArray[np.uint8]:
-        """Return the class of each pixel of frame k when its image is resized, (h, w); 255 where unlabelled.
-
-        Parameters
-        ----------
-        k : int
-            Number of a labelled frame.
-        size : (int, int)
-            Height and width of the resized image, pixels.
-        """
-
-    def files(self) -> list[Path]:
-        """Return the files of the drive: when one of them changes, its cached arrays are stale."""
+        known = np.array(sorted(self.names))
+        places = np.searchsorted(known, numbers).clip(max=len(known) - 1)
+        unknown = numbers[known[places] != numbers]
+        if unknown.size:
+            raise DataError(path, f"labels among {', '.join(map(str, known))}", f"{unknown.flat[0]}")
+        names = [self.names[number] for number in known]
+        classes = np.array([IGNORE if name is None else self.label_set.index(name) for name in names], dtype=np.uint8)
+        return classes[places]
 
 
 class FrameSequence(DriveFiles, Sequence[Frame]):
     """The frames of a drive, each read and checked on access.
 
     `drive[k]` is frame k, `drive[-1]` the last one, `drive[2:5]` a list of three. A reader derives from this class and
-    defines `__len__`, `_frame`, `name`, and `folder`, which contains the drive's files; for a `LabelledDrive` also
-    `camera` and `label_set`. If the data's licence requires attribution, `credit` is its text.
+    defines `__len__`, `_frame`, `name`, and `folder`, which contains the drive's files; for training and scoring also
+    `camera`, the same for all frames, and `label_set`, the classes of image labels and truth. If the data's licence
+    requires attribution, `credit` is its text.
     """
 
     name: str
     folder: Path
+    camera: Camera
+    label_set: LabelSet
     credit: str = ""
 
     @overload
@@ -122,20 +113,35 @@ class FrameSequence(DriveFiles, Sequence[Frame]):
         return (partial(self._frame, k) for k in range(len(self)))
 
     def truth(self, k: int, spec: GridSpec) -> NDArray[np.uint8]:
-        """Return the bird's-eye labels of the cells that the camera sees.
+        """Return the class of each cell that the camera sees at frame k, (H, W); 255 where nothing is known.
 
-        Parameters and result are those of `LabelledDrive.truth`.
+        Parameters
+        ----------
+        k : int
+            Number of a labelled frame.
+        spec : GridSpec
+            The grid, (H, W) cells.
         """
         return visible_labels(self._labels_of(k), spec)
 
     def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
-        """Return `FrameLabels.undecided_on` of a frame's labels. Parameters are those of `LabelledDrive.truth`."""
+        """Return the cells in view of the camera when the labels have gaps, (H, W); no cell when they have none.
+
+        In these cells 255 in `truth` means that the camera may see something unlabelled, so training ignores them. The
+        other unlabelled cells become unknown classes, even where a LIDAR saw more. Parameters are those of
+        `FrameSequence.truth`.
+        """
         return self._labels_of(k).undecided_on(spec)
 
     def image_labels(self, k: int, size: tuple[int, int]) -> NDArray[np.uint8]:
-        """Return the labels of a frame's image, resized (`resize_labels`).
+        """Return the class of each pixel of frame k when its image is resized, (h, w); 255 where unlabelled.
 
-        Parameters and result are those of `LabelledDrive.image_labels`.
+        Parameters
+        ----------
+        k : int
+            Number of a labelled frame.
+        size : (int, int)
+            Height and width of the resized image, pixels.
         """
         labels = self._labels_of(k)
         return resize_labels(labels.image, size, sparse=labels.undecided is not None)
@@ -148,7 +154,7 @@ class FrameSequence(DriveFiles, Sequence[Frame]):
         return labels
 
     def files(self) -> list[Path]:
-        """Return all files below the folder of the drive."""
+        """Return all files below the folder of the drive: when one of them changes, its cached arrays are stale."""
         return [path for path in self.folder.rglob("*.*") if path.is_file()]
 
     @abstractmethod

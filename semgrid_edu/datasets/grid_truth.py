@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
-from semgrid_edu.datasets.frames import LabelledDrive, visible_labels
+from semgrid_edu.datasets.frames import FrameSequence, visible_labels
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.frame import FrameLabels
 from semgrid_edu.grid import GridSpec
@@ -60,12 +60,12 @@ def decided_truth(
     return np.where(in_view, truth, unseen)
 
 
-def truth_to_learn(drive: LabelledDrive, k: int, belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
+def truth_to_learn(drive: FrameSequence, k: int, belief_probability: NDArray, spec: GridSpec) -> NDArray[np.uint8]:
     """Return the class of each cell of a drive's frame; 255 where the camera may see something unlabelled.
 
     Parameters
     ----------
-    drive : LabelledDrive
+    drive : FrameSequence
         The drive, whose label set is KITTI-14 or SYNTHIA-10.
     k : int
         Number of a labelled frame.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from semgrid_edu.datasets.frames import LabelledDrive
+from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.pandaset_files import semseg_folder
@@ -29,12 +29,12 @@ class Reader(NamedTuple):
     Parameters
     ----------
     open : callable
-        (root, *name) -> `LabelledDrive`.
+        (root, *name) -> `FrameSequence`.
     keys : tuple of str
         The keys in dataset.json that name the drive of a frame.
     """
 
-    open: Callable[..., LabelledDrive]
+    open: Callable[..., FrameSequence]
     keys: tuple[str, ...] = ("drive",)
 
 
@@ -76,7 +76,7 @@ class DatasetIndex:
     splits : dict of str to tuple of LabelledFrame
         Labelled frames by split, such as "train" and "test"; no drive is in two splits.
     reader : callable
-        ``(root, *drive)`` -> `LabelledDrive`: opens a drive. Worker processes must be able to import it.
+        ``(root, *drive)`` -> `FrameSequence`: opens a drive. Worker processes must be able to import it.
     folder : Path, optional
         Cached arrays go to `cache/` in this folder; `root` when left out.
     """
@@ -85,7 +85,7 @@ class DatasetIndex:
     name: str
     label_set: LabelSet
     splits: dict[str, tuple[LabelledFrame, ...]]
-    reader: Callable[..., LabelledDrive] = KittiRawDrive
+    reader: Callable[..., FrameSequence] = KittiRawDrive
     folder: Path | None = None
 
     def frames_by_drive(self, split: str) -> dict[tuple[str, ...], list[int]]:
@@ -108,12 +108,12 @@ class DatasetIndex:
             frames.setdefault(drive, []).append(frame)
         return frames
 
-    def drives(self, split: str) -> list[tuple[LabelledDrive, list[int]]]:
+    def drives(self, split: str) -> list[tuple[FrameSequence, list[int]]]:
         """Open the drives of a split. Parameters are those of `DatasetIndex.frames_by_drive`.
 
         Returns
         -------
-        list of (LabelledDrive, list of int)
+        list of (FrameSequence, list of int)
             Each drive, and the numbers of its labelled frames.
 
         Raises
@@ -127,7 +127,7 @@ class DatasetIndex:
         by_drive = self.frames_by_drive(split).items()
         return [(self._opened(drive, max(numbers)), numbers) for drive, numbers in by_drive]
 
-    def _opened(self, name: tuple[str, ...], last: int) -> LabelledDrive:
+    def _opened(self, name: tuple[str, ...], last: int) -> FrameSequence:
         """Open a drive and check its length and label set against the index."""
         drive = self.reader(self.root, *name)
         if last >= len(drive):

@@ -77,7 +77,8 @@ def read_label(folder: Path, kind: str, name: str, image_size: tuple[int, int] |
     """
     path = folder / kind / name
     if kind == "depth":
-        return _metres(read_png(path, "I;16", image_size))
+        steps = read_png(path, "I;16", image_size)
+        return np.where(steps > 0, steps.astype(np.float32) * np.float32(DEPTH_UNIT), np.float32(np.nan))
     if kind == "visible":
         return _mask(path, read_png(path, "L", LABEL_GRID.shape))
     classes = read_png(path, "L", image_size if kind == "image" else LABEL_GRID.shape)
@@ -108,11 +109,6 @@ def read_label_set(path: Path) -> LabelSet:
         expected = f"one of {', '.join(LABEL_SETS)}, and perhaps a second line, {WITH_GAPS}"
         raise DataError(path, expected, repr("\n".join([name, *more])))
     return LABEL_SETS[name]
-
-
-def _metres(steps: NDArray[np.uint16]) -> NDArray[np.float32]:
-    """Convert a depth image to metres, NaN where there is no depth."""
-    return np.where(steps > 0, steps.astype(np.float32) * np.float32(DEPTH_UNIT), np.float32(np.nan))
 
 
 def _classes(path: Path, classes: NDArray[np.uint8], label_set: LabelSet) -> NDArray[np.uint8]:

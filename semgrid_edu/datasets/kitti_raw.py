@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
 from semgrid_edu.datasets.calibration import read_camera, read_rectification, read_rigid
-from semgrid_edu.datasets.drive_files import IMAGE_SUFFIXES, first_sound, numbers_in, photograph, what_is_in
+from semgrid_edu.datasets.drive_files import IMAGE_SUFFIXES, first_sound, numbers_in, photograph, what_is, what_is_in
 from semgrid_edu.datasets.frames import FrameSequence, error_of, read_scan
 from semgrid_edu.datasets.kitti_labels import (
     KINDS,
@@ -21,7 +21,6 @@ from semgrid_edu.datasets.kitti_labels import (
     read_label_set,
     read_labels,
 )
-from semgrid_edu.datasets.layouts import what_is
 from semgrid_edu.datasets.oxts import imu_pose, read_packet, read_timestamps
 from semgrid_edu.datasets.project_lidar import cells_in_view
 from semgrid_edu.errors import ArgumentError, DataError, check_text

@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.datasets.frames import LabelledDrive
+from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.ground_truth import Moment, TruthPolicy, drive_truth
 from semgrid_edu.datasets.training_arrays import SEED, ArrayRecipe
 from semgrid_edu.errors import ArgumentError
@@ -77,13 +77,13 @@ class LidarTruth:
 
 
 def drive_labels(
-    drive: LabelledDrive, labelled: Sequence[int], recipe: ArrayRecipe, truth: LidarTruth, number: int
+    drive: FrameSequence, labelled: Sequence[int], recipe: ArrayRecipe, truth: LidarTruth, number: int
 ) -> list[NDArray[np.uint8]]:
     """Make the labels of a drive's labelled frames.
 
     Parameters
     ----------
-    drive : LabelledDrive
+    drive : FrameSequence
         The drive.
     labelled : sequence of int
         Numbers of its labelled frames.

@@ -164,7 +164,7 @@ class PandasetScene(FrameSequence):
         """Return the class of each pixel of the resized image, from the closest return there that the camera sees.
 
         Labels of single pixels can't be resized like an image, so the returns are projected again for each size.
-        Parameters not named here are those of `LabelledDrive.image_labels`.
+        Parameters not named here are those of `FrameSequence.image_labels`.
 
         Parameters
         ----------
@@ -182,7 +182,7 @@ class PandasetScene(FrameSequence):
     def undecided(self, k: int, spec: GridSpec) -> NDArray[np.bool_]:
         """Return the cells in view of the camera, (H, W); only some of them have a labelled return.
 
-        Parameters are those of `LabelledDrive.truth`.
+        Parameters are those of `FrameSequence.truth`.
         """
         return cells_in_view(self._camera(k), spec)
 

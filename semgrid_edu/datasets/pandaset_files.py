@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from semgrid_edu.camera import invert_rigid, rigid_transform, transform_points
-from semgrid_edu.datasets.class_tables import ClassTable
 from semgrid_edu.datasets.cuboids import Cuboids, LabelledScan
+from semgrid_edu.datasets.frames import ClassTable
 from semgrid_edu.errors import DataError
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.storage.pickled_tables import PickledTable, read_pickled_table

@@ -15,9 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, invert_rigid, lidar_from_grid, transform_points
-from semgrid_edu.datasets.benchmark_calibration import BenchmarkCalibration, parse_pose, read_benchmark_calibration
-from semgrid_edu.datasets.calibration import camera_from
-from semgrid_edu.datasets.class_tables import ClassTable
+from semgrid_edu.datasets.calibration import BenchmarkCalibration, camera_from, parse_pose, read_benchmark_calibration
 from semgrid_edu.datasets.drive_files import (
     IMAGE_SUFFIXES,
     first_sound,
@@ -26,7 +24,7 @@ from semgrid_edu.datasets.drive_files import (
     numbers_in,
     photograph,
 )
-from semgrid_edu.datasets.frames import FrameSequence, nothing_known, read_scan
+from semgrid_edu.datasets.frames import ClassTable, FrameSequence, nothing_known, read_scan
 from semgrid_edu.datasets.project_lidar import birdseye_votes, seen_returns
 from semgrid_edu.errors import DataError, check_text
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels

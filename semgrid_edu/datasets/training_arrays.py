@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from semgrid_edu.datasets.frames import LabelledDrive
+from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.grid_truth import truth_to_learn
 from semgrid_edu.datasets.project_lidar import seen_returns
 from semgrid_edu.errors import DataError
@@ -46,12 +46,12 @@ class ArrayRecipe(NamedTuple):
     track: Callable = track_drive
 
 
-def drive_arrays(drive: LabelledDrive, labelled: Sequence[int], recipe: ArrayRecipe) -> list[dict[str, NDArray]]:
+def drive_arrays(drive: FrameSequence, labelled: Sequence[int], recipe: ArrayRecipe) -> list[dict[str, NDArray]]:
     """Run the occupancy filter over a drive, and make the arrays of its labelled frames.
 
     Parameters
     ----------
-    drive : LabelledDrive
+    drive : FrameSequence
         The drive.
     labelled : sequence of int
         Numbers of its labelled frames.
@@ -78,7 +78,7 @@ def drive_arrays(drive: LabelledDrive, labelled: Sequence[int], recipe: ArrayRec
 
 
 def _frame_arrays(
-    drive: LabelledDrive, k: int, frame: Frame, occupancy: NDArray, recipe: ArrayRecipe
+    drive: FrameSequence, k: int, frame: Frame, occupancy: NDArray, recipe: ArrayRecipe
 ) -> dict[str, NDArray]:
     """Make the arrays of one frame."""
     if frame.image is None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
 from semgrid_edu.datasets import label_policies, training_arrays
-from semgrid_edu.datasets.frames import LabelledDrive
+from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.index import DatasetIndex, relative_path
 from semgrid_edu.datasets.label_policies import LidarTruth, drive_labels
 from semgrid_edu.datasets.training_arrays import ArrayRecipe, drive_arrays
@@ -136,7 +136,7 @@ def in_each_drive(make: Callable[..., list], jobs: Sequence[tuple], what: str) -
 
 
 def _code_and_files(
-    index: DatasetIndex, drives: Sequence[tuple[LabelledDrive, list[int]]], recipe: ArrayRecipe
+    index: DatasetIndex, drives: Sequence[tuple[FrameSequence, list[int]]], recipe: ArrayRecipe
 ) -> list[str]:
     """Describe the code that makes the arrays, and the drives' files by name, size and time of the last change."""
     readers = {type(drive) for drive, _ in drives}  # these, and the sensor model, may be outside the package

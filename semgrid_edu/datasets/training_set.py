@@ -13,7 +13,7 @@ from torch import Tensor
 from torch.utils.data import Dataset
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.frames import LabelledDrive
+from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.grid_truth import fill_gaps_with_unknown
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame, load_index
 from semgrid_edu.datasets.label_policies import LidarTruth
@@ -69,7 +69,7 @@ class TrainingSet(Dataset[Sample]):
     ----------
     dataset : path-like or DatasetIndex
         The folder of a data set with dataset.json, such as data/minikitti; or an index made in Python, whose reader may
-        be any class of a `LabelledDrive`.
+        be any class of a `FrameSequence`.
     split : str
         One of its splits, such as "train".
     spec : GridSpec, optional
@@ -80,7 +80,7 @@ class TrainingSet(Dataset[Sample]):
         Parameters of the occupancy filter; the package's defaults when left out.
     truth : LidarTruth, optional
         How to make the truth from image labels and LIDAR, which real data need. By default the truth comes from the
-        data set (`LabelledDrive.truth`).
+        data set (`FrameSequence.truth`).
 
     Attributes
     ----------
@@ -256,7 +256,7 @@ class Mixture(Sequence[Sample]):
         return cameras[camera], turns
 
 
-def _shared_camera(drives: Sequence[tuple[LabelledDrive, list[int]]]) -> Camera:
+def _shared_camera(drives: Sequence[tuple[FrameSequence, list[int]]]) -> Camera:
     """Return the camera of a split's drives, which must all have the same one, because they share a sampler."""
     (first, _), *others = drives
     camera = first.camera

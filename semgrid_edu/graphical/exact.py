@@ -65,13 +65,8 @@ def enumerate_marginals(
     return Factor(names, table)
 
 
-def eliminate(
-    model: GraphicalModel,
-    names: str | Sequence[str],
-    given: Mapping[str, int] = NOTHING,
-    order: Sequence[str] | None = None,
-) -> Factor:
-    """Sum out one variable at a time, each from the product of only the factors that contain it.
+def eliminate(model: GraphicalModel, names: str | Sequence[str], given: Mapping[str, int] = NOTHING) -> Factor:
+    """Sum out one variable at a time, in `min_fill_order`, each from the product of only the factors that contain it.
 
     The result isn't normalised, because its total is useful: P(given) in a directed model, the partition function Z in
     an undirected one. `.normalised()` gives P(names | given). Without evidence, the total of a directed model is 1, so
@@ -85,8 +80,6 @@ def eliminate(
         The variables to keep, in the order of the result's axes; () gives only the total.
     given : dict of str to int
         The states of observed variables.
-    order : sequence of str, optional
-        The order in which to sum out all other variables; by default `min_fill_order`.
 
     Returns
     -------
@@ -97,8 +90,7 @@ def eliminate(
     ------
     ArgumentError
         When a product would have more than 10^7 entries (the message names its variables), a variable or state is
-        unknown, `order` isn't a permutation of the variables to sum out, or the total is outside the range of floats,
-        such as P(given) of a long chain; see `log_total`.
+        unknown, or the total is outside the range of floats, such as P(given) of a long chain; see `log_total`.
 
     Examples
     --------
@@ -107,7 +99,7 @@ def eliminate(
     >>> found.table.round(2), found.table.sum().round(2), found.normalised().table.round(2)
     (array([0.08, 0.16]), np.float64(0.24), array([0.33, 0.67]))
     """
-    found, power = _summed_out(model, names, given, order)
+    found, power = _summed_out(model, names, given)
     with np.errstate(over="ignore", under="ignore"):
         table = np.ldexp(found.table, power)
     if found.table.any() and not np.finfo(float).tiny <= table.max() < np.inf:
@@ -116,7 +108,7 @@ def eliminate(
     return Factor(found.names, table)
 
 
-def log_total(model: GraphicalModel, given: Mapping[str, int] = NOTHING, order: Sequence[str] | None = None) -> float:
+def log_total(model: GraphicalModel, given: Mapping[str, int] = NOTHING) -> float:
     """Return the logarithm of `eliminate(model, ())`: log P(given), or log Z of an undirected model.
 
     P(given) of a chain with thousands of measurements underflows, but its logarithm doesn't. log P(x | given) is the
@@ -128,8 +120,6 @@ def log_total(model: GraphicalModel, given: Mapping[str, int] = NOTHING, order: 
         Directed or undirected.
     given : dict of str to int
         The states of observed variables.
-    order : sequence of str, optional
-        As for `eliminate`.
 
     Returns
     -------
@@ -139,8 +129,7 @@ def log_total(model: GraphicalModel, given: Mapping[str, int] = NOTHING, order: 
     Raises
     ------
     ArgumentError
-        When a product would have more than 10^7 entries, a variable or state is unknown, or `order` isn't a
-        permutation of the unobserved variables.
+        When a product would have more than 10^7 entries, or a variable or state is unknown.
 
     Examples
     --------
@@ -148,7 +137,7 @@ def log_total(model: GraphicalModel, given: Mapping[str, int] = NOTHING, order: 
     >>> round(log_total(coins, {name: 0 for name in coins.names}) / np.log(2))
     -2000
     """
-    found, power = _summed_out(model, (), given, order)
+    found, power = _summed_out(model, (), given)
     return log(found.table) + power * log(2) if found.table > 0 else -np.inf
 
 
@@ -236,15 +225,13 @@ def _fill(neighbours: Mapping[str, set[str]], name: str) -> list[tuple[str, str]
     return [(one, other) for one, other in combinations(sorted(neighbours[name]), 2) if other not in neighbours[one]]
 
 
-def _summed_out(
-    model: GraphicalModel, names: str | Sequence[str], given: Mapping[str, int], order: Sequence[str] | None
-) -> tuple[Factor, int]:
+def _summed_out(model: GraphicalModel, names: str | Sequence[str], given: Mapping[str, int]) -> tuple[Factor, int]:
     """Return the marginal over `names` divided by 2^n, and n; each product is rescaled by a power of two."""
     model = model.given(**given)
     names = _wanted(model, names, given)
     power = 0
     factors = list(model.factors)
-    for name in _checked_order(model, names, order):
+    for name in min_fill_order(model, keep=names):
         # Multiply the factors that contain the variable, and put their product, summed over it, in their place.
         clique, more = rescaled_product(factor for factor in factors if name in factor.names)
         factors = [factor for factor in factors if name not in factor.names] + [clique.sum(name)]
@@ -263,12 +250,3 @@ def _wanted(model: GraphicalModel, names: str | Sequence[str], given: Mapping[st
     for name in names:
         check_name("names", name, model.names)
     return names
-
-
-def _checked_order(model: GraphicalModel, names: tuple[str, ...], order: Sequence[str] | None) -> tuple[str, ...]:
-    hidden = sorted(set(model.names) - set(names))
-    if order is None:
-        return min_fill_order(model, keep=names)
-    if sorted(order) != hidden:
-        raise ArgumentError("order", f"each variable to sum out once: {', '.join(hidden)}", ", ".join(order))
-    return tuple(order)

@@ -48,9 +48,7 @@ Messages = dict[tuple[str, str], NDArray[np.float64]]
 """Messages by (source, target); each is a distribution (K,) over the variable at one end of the link."""
 
 
-def sum_product(
-    model: GraphicalModel, given: Mapping[str, int] = NOTHING, iterations: int = 50, damping: float = 0.0
-) -> Beliefs:
+def sum_product(model: GraphicalModel, given: Mapping[str, int] = NOTHING, iterations: int = 50) -> Beliefs:
     """Pass messages between variables and factors until they converge; a belief is the product of incoming messages.
 
     A variable's message to a factor is the product of the messages from its other factors. A factor's message to a
@@ -69,8 +67,6 @@ def sum_product(
         The states of observed variables. Their factors are sliced first, which may break loops.
     iterations : int
         Maximum number of iterations, at least 1.
-    damping : float
-        Weight of the old message, 0 <= damping < 1. Damping helps loopy graphs to converge.
 
     Returns
     -------
@@ -93,8 +89,6 @@ def sum_product(
     """
     if iterations < 1:
         raise ArgumentError("iterations", "at least 1", iterations)
-    if not 0 <= damping < 1:
-        raise ArgumentError("damping", "0 <= damping < 1", damping)
     sliced = possible(model, given)
     labelled = zip(model.labels, sliced.factors, strict=True)
     factors = {label: factor.rescaled()[0] for label, factor in labelled if factor.names}
@@ -111,8 +105,7 @@ def sum_product(
         # A new message is used at once, so information crosses a whole chain in one iteration.
         for source in (*reversed(outwards), *outwards):
             for target in links[source]:
-                message = _message(source, target, links, factors, messages)
-                messages[source, target] = (1 - damping) * message + damping * messages[source, target]
+                messages[source, target] = _message(source, target, links, factors, messages)
         converged = all(abs(messages[link] - before[link]).max() <= TOLERANCE for link in messages)
     incoming = {name: [messages[label, name] for label in links[name]] for name in sliced.names}
     return Beliefs(

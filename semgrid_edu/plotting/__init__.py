@@ -5,7 +5,14 @@ are drawn as top-down maps in metres: the x axis points up, which is forward, an
 decrease from left to right. Arrays are never flipped: row 0 is the farthest ahead, column 0 the leftmost.
 """
 
-from semgrid_edu.plotting.animations import MAX_ANIMATION_BYTES, Animation, animate
+from semgrid_edu.plotting.animations import (
+    MAX_ANIMATION_BYTES,
+    Animation,
+    animate,
+    animate_occupancy,
+    particles,
+    velocity_wheel,
+)
 from semgrid_edu.plotting.charts import (
     confusion,
     training_curves,
@@ -23,8 +30,7 @@ from semgrid_edu.plotting.colours import (
     velocity_colours,
 )
 from semgrid_edu.plotting.grids import grid_labels, grid_values, label_maps, occupancy, velocity, velocity_arrows
-from semgrid_edu.plotting.images import image_labels, image_values, plane_on_image, points_on_image
-from semgrid_edu.plotting.moving import animate_occupancy, particles, velocity_wheel
+from semgrid_edu.plotting.images import image_labels, points_on_image
 
 FIGURE_DPI = 110
 """Dots per inch of all notebook figures: `plt.rcParams["figure.dpi"] = plotting.FIGURE_DPI`."""
@@ -47,12 +53,10 @@ __all__ = [
     "grid_labels",
     "grid_values",
     "image_labels",
-    "image_values",
     "label_maps",
     "occupancy",
     "occupancy_colours",
     "particles",
-    "plane_on_image",
     "points_on_image",
     "training_curves",
     "velocity",

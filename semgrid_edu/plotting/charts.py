@@ -52,7 +52,7 @@ def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> 
     return ax
 
 
-def training_curves(logs: "TrainingLog | Mapping[str, TrainingLog]", ax: Axes | None = None) -> Axes:
+def training_curves(logs: "Mapping[str, TrainingLog]") -> Axes:
     """Draw the loss of training runs over steps: one point per step, and a line for the running mean.
 
     The losses of the two stages aren't comparable, one is over pixels and one over cells, so the line breaks between
@@ -60,23 +60,20 @@ def training_curves(logs: "TrainingLog | Mapping[str, TrainingLog]", ax: Axes | 
 
     Parameters
     ----------
-    logs : TrainingLog, or mapping of name to TrainingLog
+    logs : mapping of str to TrainingLog
         Logs from `read_log`, by their names in the legend.
-    ax : Axes, optional
-        Axes to draw into.
 
     Raises
     ------
     ArgumentError
         When there is no training run, or a run has no step with a finite loss.
     """
-    logs = logs if isinstance(logs, Mapping) else {"": logs}
     if not logs or not all(len(log.loss) for log in logs.values()):
         raise ArgumentError("logs", "at least one training run, each with at least one step", list(logs) or "none")
     for name, log in logs.items():
         if not np.any(np.isfinite(log.loss) & (log.loss > 0)):
-            raise ArgumentError("logs", "a finite loss in each training run", f"none in {name or 'this one'}")
-    ax = ax or plt.subplots(figsize=(8, 4), layout="constrained")[1]
+            raise ArgumentError("logs", "a finite loss in each training run", f"none in {name}")
+    ax = plt.subplots(figsize=(8, 4), layout="constrained")[1]
     for number, (name, log) in enumerate(logs.items()):
         _curve(ax, log, name, f"C{number}")
     for stage, begin in _stages(next(iter(logs.values()))):
@@ -87,8 +84,7 @@ def training_curves(logs: "TrainingLog | Mapping[str, TrainingLog]", ax: Axes | 
     ax.set_title(f"points: single steps; lines: running means of {SMOOTHING} steps", loc="left", fontsize="medium")
     ax.set(xlabel="step", ylabel="loss: weighted cross-entropy [nats]")
     ax.grid(alpha=0.3)
-    if any(logs):
-        ax.legend(loc="upper right")
+    ax.legend(loc="upper right")
     return ax
 
 

@@ -151,21 +151,7 @@ def read_png(path: Path, mode: str, size: tuple[int, int] | None) -> NDArray:
     DataError
         If the file isn't a valid PNG of this format and size.
     """
-    content = read_bytes(path)
-    try:
-        _open_png(content).verify()
-        image = _open_png(content)
-        found = "RGB;16" if image.tile[0][3] == "RGB;16B" else image.mode
-        pixels = _sixteen_bits(content) if found == "RGB;16" else np.array(image)
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise DataError(path, "a sound PNG image", f"{str(error).partition(' <')[0]!r}") from error
-    if PNG_END not in content:
-        raise DataError(path, "a sound PNG image", "one without its end")
-    height, width = pixels.shape[:2]
-    if found != mode or (height, width) != (size or (height, width)):
-        expected = f"{mode} of {size[0]} x {size[1]} pixels" if size else mode
-        raise DataError(path, expected, f"{found} of {height} x {width} pixels")
-    return pixels
+    return _pixels(path, "PNG", mode, size)
 
 
 def read_image(path: Path, size: tuple[int, int] | None) -> NDArray[np.uint8]:
@@ -178,44 +164,35 @@ def read_image(path: Path, size: tuple[int, int] | None) -> NDArray[np.uint8]:
     size : (int, int) or None
         Height and width that the image must have, pixels; None if any size will do.
     """
-    return read_jpeg(path, size) if path.suffix.lower() in (".jpg", ".jpeg") else read_png(path, "RGB", size)
+    return _pixels(path, "JPEG" if path.suffix.lower() in (".jpg", ".jpeg") else "PNG", "RGB", size)
 
 
-def read_jpeg(path: Path, size: tuple[int, int] | None) -> NDArray[np.uint8]:
-    """Return the pixels of a JPEG, (h, w, 3), RGB.
-
-    Parameters
-    ----------
-    path : Path
-        The file to read.
-    size : (int, int) or None
-        Height and width that the image must have, pixels; None if any size will do.
-
-    Raises
-    ------
-    DataError
-        If the file isn't a valid JPEG of this size.
-    """
+def _pixels(path: Path, kind: str, mode: str, size: tuple[int, int] | None) -> NDArray:
+    """Return the pixels of an image of one format, "PNG" or "JPEG"."""
     content = read_bytes(path)
     try:
-        image = Image.open(io.BytesIO(content), formats=["JPEG"])
-        pixels = np.array(image)
+        _opened(content, kind).verify()
+        image = _opened(content, kind)
+        found = "RGB;16" if image.tile[0][3] == "RGB;16B" else image.mode
+        pixels = _sixteen_bits(content) if found == "RGB;16" else np.array(image)
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise DataError(path, "a sound JPEG image", f"{str(error).partition(' <')[0]!r}") from error
+        raise DataError(path, f"a sound {kind} image", f"{str(error).partition(' <')[0]!r}") from error
+    if kind == "PNG" and PNG_END not in content:
+        raise DataError(path, "a sound PNG image", "one without its end")
     height, width = pixels.shape[:2]
-    if image.mode != "RGB" or (height, width) != (size or (height, width)):
-        expected = f"RGB of {size[0]} x {size[1]} pixels" if size else "RGB"
-        raise DataError(path, expected, f"{image.mode} of {height} x {width} pixels")
+    if found != mode or (height, width) != (size or (height, width)):
+        expected = f"{mode} of {size[0]} x {size[1]} pixels" if size else mode
+        raise DataError(path, expected, f"{found} of {height} x {width} pixels")
     return pixels
 
 
-def _open_png(content: bytes) -> Image.Image:
-    return Image.open(io.BytesIO(content), formats=["PNG"])
+def _opened(content: bytes, kind: str) -> Image.Image:
+    return Image.open(io.BytesIO(content), formats=[kind])
 
 
 def _sixteen_bits(content: bytes) -> NDArray[np.uint16]:
     """Decode three 16-bit channels. Pillow keeps only 8 bits: the upper ones, or the lower ones on request."""
-    upper = _open_png(content)
-    lower = _open_png(content)
+    upper = _opened(content, "PNG")
+    lower = _opened(content, "PNG")
     lower.tile = [(*lower.tile[0][:3], "RGB;16L")]
     return np.array(upper).astype(np.uint16) << 8 | np.array(lower)

@@ -163,7 +163,9 @@ def fit(
                 batch = batch._replace(sampler=samplers[dataset.turn(iteration)[0]])
             batch = share_of_batch(batch, fabric.global_rank, fabric.world_size, fabric.device)
             step = Step(iteration, stage, rate, learn(fabric, objective, optimiser, batch))
-            _check_finite(step, params.learning_rate)
+            if not math.isfinite(step.loss):  # training can't recover from it
+                found = f"{params.learning_rate}, with which it is {step.loss} in iteration {iteration}"
+                raise ArgumentError("learning_rate", "a rate that keeps the loss finite", found)
             yield step
 
 
@@ -245,13 +247,6 @@ def _freezing(net: nn.Module) -> Iterator[list[nn.Parameter]]:
     finally:
         for parameter in learnable:
             parameter.requires_grad_(True)
-
-
-def _check_finite(step: Step, learning_rate: float) -> None:
-    """Stop after an infinite or NaN loss, because training can't recover from it."""
-    if not math.isfinite(step.loss):
-        found = f"{learning_rate}, with which it is {step.loss} in iteration {step.iteration}"
-        raise ArgumentError("learning_rate", "a rate that keeps the loss finite", found)
 
 
 def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: TrainingParams, n_processes: int) -> None:

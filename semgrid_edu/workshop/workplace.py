@@ -11,40 +11,6 @@ from multiprocessing import active_children, get_context, parent_process
 
 from semgrid_edu.errors import ArgumentError
 
-
-@contextmanager
-def worker_pool(workers: int) -> Iterator[Executor]:
-    """Yield a pool of processes. When the block raises an error, work that hasn't begun is dropped.
-
-    The processes are spawned. Forked ones would inherit the locks of torch's and numba's threads, and hang.
-
-    Parameters
-    ----------
-    workers : int
-        Number of processes.
-
-    Yields
-    ------
-    concurrent.futures.Executor
-        Its processes end with the block, or when this process is killed.
-
-    Raises
-    ------
-    ChildProcessError
-        When a process ends before its work does.
-    """
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_end_with_parent) as pool:
-        try:
-            yield pool
-        except BrokenExecutor as error:
-            raise ChildProcessError(DIED) from error
-        except BaseException as error:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for worker in active_children() if isinstance(error, KeyboardInterrupt) else ():
-                worker.terminate()  # it may have an hour of work before it
-            raise
-
-
 DIED = (
     'a worker process died. Either memory ran out, or your script starts workers outside `if __name__ == "__main__":`'
 )
@@ -102,7 +68,9 @@ def check_workers(workers: int) -> None:
 
 @contextmanager
 def workplace(workers: int | None = None) -> Iterator[Workplace]:
-    """Open the place where tasks run.
+    """Open the place where tasks run. When the block raises an error, work that hasn't begun is dropped.
+
+    The processes are spawned. Forked ones would inherit the locks of torch's and numba's threads, and hang.
 
     Parameters
     ----------
@@ -112,13 +80,24 @@ def workplace(workers: int | None = None) -> Iterator[Workplace]:
     Yields
     ------
     Workplace
+        Its processes end with the block, or when this process is killed.
 
     Raises
     ------
     ArgumentError
         When there are no workers or too many.
+    ChildProcessError
+        When a process ends before its work does.
     """
     number = usable_cores() if workers is None else workers
     check_workers(number)
-    with worker_pool(number) as pool:
-        yield Workplace(pool, number)
+    with ProcessPoolExecutor(number, mp_context=get_context("spawn"), initializer=_end_with_parent) as pool:
+        try:
+            yield Workplace(pool, number)
+        except BrokenExecutor as error:
+            raise ChildProcessError(DIED) from error
+        except BaseException as error:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for worker in active_children() if isinstance(error, KeyboardInterrupt) else ():
+                worker.terminate()  # it may have an hour of work before it
+            raise

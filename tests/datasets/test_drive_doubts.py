@@ -19,7 +19,7 @@ from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.pipeline import Stages, run_pipeline
 from semgrid_edu.workshop import demo
 from semgrid_edu.workshop.commands import main as cli
-from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
+from semgrid_edu.workshop.commands.arguments import dataset_doubts
 from semgrid_edu.workshop.doubts import drive_doubts, frame_doubts
 from semgrid_edu.workshop.pose_doubts import FASTEST, packet_doubts, path_doubts
 
@@ -222,8 +222,7 @@ def demo_says(tmp_path, monkeypatch, capsys) -> Callable[[], str]:
     """Run the demo up to where the work begins, which reads the first frame, and return what it says."""
 
     def says() -> str:
-        command = ["demo", "--kitti", str(tmp_path), "--date", DATE, "--drive", "0001"]
-        monkeypatch.setattr("sys.argv", ["semgrid-edu", *command])
+        monkeypatch.setattr("sys.argv", ["semgrid-edu", "demo", str(tmp_path)])
         monkeypatch.setattr(demo, "write_demo", lambda drive, *_, **__: (drive[0], Path("done").resolve() / "page")[1])
         with pytest.raises(SystemExit) as ended:
             cli.run()
@@ -244,7 +243,7 @@ def test_nonsense_is_refused(spoilt, says, demo_says):
     assert any(re.search(says, line) for line in spoilt.problems())
     with pytest.raises(DataError, match=says):
         next(run_pipeline(spoilt, Stages()))
-    assert re.search(f"^semgrid-edu: .*{says}", demo_says())
+    assert re.search(f"(?m)^semgrid-edu: .*{says}", demo_says())
 
 
 def test_returns_in_millimetres_that_no_reader_refused():

@@ -4,7 +4,7 @@ import pytest
 from tiny_drive import DATE, write_tiny_drive
 
 from semgrid_edu.datasets import KittiRawDrive
-from semgrid_edu.datasets.layouts import LAYOUTS, what_is
+from semgrid_edu.datasets.drive_files import LAYOUTS, what_is
 from semgrid_edu.errors import DataError
 
 FOLDERS = {

@@ -36,8 +36,7 @@ def out(drive, tmp_path_factory):
     """The page of the tiny drive with the example under a student's name, made by the command line."""
     folder = tmp_path_factory.mktemp("student")
     shutil.copy(EXAMPLE, folder / "my_stages.py")
-    root = str(drive.folder.parents[1])
-    arguments = ["--kitti", root, "--date", DATE, "--drive", "0001", "--stages", str(folder / "my_stages.py")]
+    arguments = [str(drive.folder), "--stages", str(folder / "my_stages.py")]
     arguments += ["--weights", str(sample_weights())]
     result = CliRunner().invoke(app, ["demo", *arguments, "--out", str(folder / "out")])
     assert result.exit_code == 0, result.exception

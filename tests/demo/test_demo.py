@@ -181,8 +181,7 @@ def test_times_are_medians_of_the_stages():
 @pytest.fixture(scope="module")
 def remembering(drive, weights, tmp_path_factory):
     folder = tmp_path_factory.mktemp("memory")
-    root = str(drive.folder.parents[1])
-    arguments = ["--kitti", root, "--date", DATE, "--drive", "0001", "--weights", str(weights), "--memory"]
+    arguments = [str(drive.folder), "--weights", str(weights), "--memory"]
     result = CliRunner().invoke(app, ["demo", *arguments, "--out", str(folder)])
     assert result.exit_code == 0, result.exception
     return folder
@@ -429,8 +428,7 @@ class TestChoice:
         assert "(one in 2 of frames 0 to 4; it has 6)" in html
 
     def test_another_network_is_taken_and_one_of_the_image_stage_refused(self, drive, tmp_path):
-        root = str(drive.folder.parents[1])
-        options = ["demo", "--kitti", root, "--date", DATE, "--drive", "0001", "--out", str(tmp_path), "--frames", ":1"]
+        options = ["demo", str(drive.folder), "--out", str(tmp_path), "--frames", ":1"]
         stage = CliRunner().invoke(app, [*options, "--weights", str(sample_image_stage("fcn"))])
         assert "image stage" in str(stage.exception)
         result = CliRunner().invoke(app, [*options, "--weights", str(sample_weights("fcn"))])

@@ -22,8 +22,13 @@ from semgrid_edu.workshop.paper.score_runs import (
     CountingRun,
 )
 from semgrid_edu.workshop.paper.variants import EXACT, CalibrationError
-from semgrid_edu.workshop.scoring.confusions import BANDS, distance_band_names, save_confusions
-from semgrid_edu.workshop.scoring.counting import count_grids, distance_bands
+from semgrid_edu.workshop.scoring.confusions import (
+    BANDS,
+    count_grids,
+    distance_band_names,
+    distance_bands,
+    save_confusions,
+)
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 
 SPEC = GridSpec(0.0, 71.0, -15.5, 15.5, 0.5)

@@ -27,9 +27,8 @@ from semgrid_edu.workshop.course.nbgrader.preprocessors import instructors_cells
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 from semgrid_edu.workshop.course.sandbox.limits import Limits
 from semgrid_edu.workshop.course.sandbox.notebook import TestCells, _prepare, cell_name, run_submission
-from semgrid_edu.workshop.course.sandbox.process import StudentProcess
+from semgrid_edu.workshop.course.sandbox.process import PREPARED, StudentProcess, worker_environment
 from semgrid_edu.workshop.course.sandbox.session import Session
-from semgrid_edu.workshop.course.sandbox.surroundings import PREPARED, worker_environment
 
 SERVER = Path(__file__).with_name("warm_server.py")
 

@@ -24,14 +24,6 @@ def test_on_trees_it_is_exact_after_one_iteration(seed):
         np.testing.assert_array_equal(belief, sum_product(model, evidence, iterations=1).marginals[name])
 
 
-def test_damping_reaches_the_same_on_a_tree():
-    model = random_tree(3)
-    damped = sum_product(model, iterations=200, damping=0.5)
-    assert damped.exact
-    for name, belief in sum_product(model).marginals.items():
-        np.testing.assert_allclose(damped.marginals[name], belief, atol=1e-8)
-
-
 def filtered(first, move, read, seen):
     """P(x_t | z_0 ... z_t) by the recursion of Bayes' filter."""
     belief, beliefs = first, []
@@ -145,7 +137,6 @@ def test_variables_without_factors_left_and_models_without_variables():
     ("arguments", "says"),
     [
         ({"iterations": 0}, "iterations: expected at least 1"),
-        ({"damping": 1.0}, "damping: expected 0 <= damping < 1"),
         ({"given": {"w": 0}}, "found w"),
         ({"given": {"m1": 1, "z": 0}}, r"factor P\(z \| m1, m2\)"),
         ({"given": {"m1": 1, "m2": 1, "z": 0}}, "only zeros: it can't happen"),

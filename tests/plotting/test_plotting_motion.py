@@ -14,7 +14,7 @@ from semgrid_edu import plotting
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.occupancy import Belief, Particles, State
-from semgrid_edu.plotting.moving import MAX_POINTS
+from semgrid_edu.plotting.animations import MAX_POINTS
 
 FREE, STATIC, DYNAMIC, UNKNOWN = State
 FORWARD, LEFT, BACK, RIGHT = plotting.HEADING_COLOURS

@@ -60,7 +60,7 @@ def test_a_change_of_what_is_read_or_filtered_changes_both_keys(keys, before, mo
 
 
 def test_a_change_of_how_labels_are_made_changes_theirs_alone(keys, before):
-    (arrays, labels), (same, other) = before, keys("datasets/ground_truth/carrying.py", "1.5", "2.5")
+    (arrays, labels), (same, other) = before, keys("datasets/ground_truth/making.py", "1.5", "2.5")
     assert arrays == same
     assert labels != other
 

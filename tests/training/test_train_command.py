@@ -18,7 +18,7 @@ from semgrid_edu.storage.files import sha256, write_text
 from semgrid_edu.storage.provenance import provenance_problems
 from semgrid_edu.training.log import LOG, Step, append_step, begin_log
 from semgrid_edu.workshop import training_run as experiment
-from semgrid_edu.workshop.commands import dataset_doubts
+from semgrid_edu.workshop.commands import main
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.flaws import TruthFlaws
 
@@ -44,7 +44,7 @@ class _Frames(list):
 def in_the_place_of_a_data_set(monkeypatch):
     """Frames of which no doubt can be told."""
     monkeypatch.setattr(experiment.TrainingSet, "by_camera", lambda *args, **named: [_Frames(*args, **named)])
-    monkeypatch.setattr(dataset_doubts, "dataset_doubts", lambda *_: [])
+    monkeypatch.setattr(main, "dataset_doubts", lambda *_: [])
 
 
 @pytest.fixture

@@ -428,7 +428,7 @@ _test()
 
 # %% [markdown]
 # Now on your own drive, with the lecture's three lines; `None` is the street that ships. A drive without labels has no gain to print, so look at it: save `refine` and its imports as `my_stages.py`, and run
-# `semgrid-edu demo --stages my_stages.py --kitti FOLDER --date 2011_09_26 --drive 0013`. Take the `#` away in the last line when the tests have passed.
+# `semgrid-edu demo FOLDER --stages my_stages.py`. Take the `#` away in the last line when the tests have passed.
 
 
 # %%

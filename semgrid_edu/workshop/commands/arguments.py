@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 from typer.core import TyperGroup
 
-from semgrid_edu.errors import ArgumentError
+from semgrid_edu.errors import ArgumentError, DataError
 
 if TYPE_CHECKING:  # a command that needs no drive starts faster without numpy
     from pathlib import Path
@@ -119,45 +119,35 @@ def tell(doubts: Iterable[str]) -> None:
         typer.echo(f"semgrid-edu: doubtful: and {len(doubts) - SHOWN_DOUBTS} more", err=True)
 
 
-def chosen_drive(kitti: dict[str, object], pandaset: dict[str, object], camera: str | None) -> "FrameSequence | None":
-    """Open the drive that options name, one of KITTI's or one of PandaSet's scenes; None when they name none.
+def dataset_doubts(dataset_dir: "str | Path", *splits: str) -> list[str]:
+    """List the doubts about the drives of some splits of a data set, before hours of work begin.
 
     Parameters
     ----------
-    kitti : dict of str to object
-        The values of --kitti, --date and --drive; None for an option that isn't given.
-    pandaset : dict of str to object
-        The values of --pandaset and --scene.
-    camera : str or None
-        The data set's name for the camera; the first camera when left out.
+    dataset_dir : path-like
+        The folder of the data set, such as data/minikitti.
+    *splits : str
+        Such as "train".
 
-    Raises
-    ------
-    ArgumentError
-        When options of one data set are missing, both are named, or the shipped drives have no such camera.
+    Returns
+    -------
+    list of str
+        One line for each doubt, from `drive_doubts`.
     """
-    from semgrid_edu.datasets import KittiRawDrive, PandasetScene
-    from semgrid_edu.datasets.kitti_raw import VIEWS
+    import semgrid_edu.workshop.paper.datasets  # noqa: F401 (adds the paper's readers to those that dataset.json can name)
+    from semgrid_edu.datasets.index import INDEX_FILE, load_index
+    from semgrid_edu.workshop.doubts import drive_doubts
 
-    opened = []
-    for named, reader, option in ((kitti, KittiRawDrive, "view"), (pandaset, PandasetScene, "camera")):
-        given = [name for name, value in named.items() if value is not None]
-        if given and len(given) < len(named):
-            every = {2: "both", 3: "all three"}[len(named)]
-            raise ArgumentError(", ".join(named), f"{every} or none", f"only {' and '.join(given)}")
-        if given:
-            opened.append((reader, named.values(), {option: camera} if camera else {}))
-    if len(opened) > 1:
-        raise ArgumentError("--kitti, --pandaset", "one of them", "both")
-    if camera not in (None, VIEWS[0]) and not opened:
-        raise ArgumentError("--camera", f"{VIEWS[0]}, the only one of the shipped drives", camera)
-    return next((reader(*names, **view) for reader, names, view in opened), None)
+    index = load_index(dataset_dir)
+    for split in splits:
+        if split not in index.splits:
+            raise DataError(f"{dataset_dir}/{INDEX_FILE}", f"the split {split}", ", ".join(index.splits) or "none")
+    drives = [drive for split in splits for drive, _ in index.drives(split)]
+    return [doubt for drive in drives for doubt in drive_doubts(drive)]
 
 
-def drive_in(
-    path: "Path | None", reader: "Path | None", named: dict[str, object], camera: str | None
-) -> "FrameSequence":
-    """Open the drive in a folder, and say what it is.
+def drive_in(path: "Path | None", reader: "Path | None", camera: str | None) -> "FrameSequence | None":
+    """Open the drive in a folder, and say what it is; None when there is no folder, for the shipped drives.
 
     Parameters
     ----------
@@ -165,27 +155,27 @@ def drive_in(
         The folder.
     reader : Path or None
         A Python file with a class that reads it.
-    named : dict of str to object
-        The values of the options that name a drive in another way; None for one that isn't given.
     camera : str or None
-        The data set's name for the camera.
+        The data set's name for the camera; the first camera when left out.
 
     Raises
     ------
     ArgumentError
-        When there is a reader and no folder, or options name a drive, too, or a camera that the reader doesn't know.
+        When there is a reader and no folder, or a camera that the reader or the shipped drives don't know.
     DataError
         When there isn't one drive.
     """
+    from semgrid_edu.datasets.kitti_raw import VIEWS
     from semgrid_edu.workshop.demo.find_drives import drive_at, read_with
 
-    given = [name for name, value in named.items() if value is not None]
-    if given:
-        raise ArgumentError(", ".join(given), "PATH alone, which names the drive", "both")
-    if path is None:
+    if path is None and reader is not None:
         raise ArgumentError("--reader", "PATH, the folder that it reads", "no PATH")
+    if path is None and camera not in (None, VIEWS[0]):
+        raise ArgumentError("--camera", f"{VIEWS[0]}, the only one of the shipped drives", camera)
     if reader is not None and camera is not None:
         raise ArgumentError("--camera", "none: the class in --reader chooses it", camera)
+    if path is None:
+        return None
     kind, drive = ("a recording", read_with(reader, path)) if reader else drive_at(path, camera)
     typer.echo(f"semgrid-edu: {kind}: {drive.name}, {len(drive)} frames", err=True)
     return drive

@@ -30,7 +30,7 @@ PANDASET_LICENCE = (
     "forbids identifying anyone or using the makers' names for publicity. https://pandaset.org describes it; its own "
     "download has ended, and https://github.com/scaleapi/pandaset-devkit/issues/151 says where copies are. Unpack "
     "a scene so that FOLDER/002 holds lidar, camera and annotations, then run "
-    "`semgrid-edu demo --pandaset FOLDER --scene 002`."
+    "`semgrid-edu demo FOLDER/002`."
 )
 """Instructions for getting PandaSet, which a program can't download for the user."""
 

@@ -13,7 +13,14 @@ from semgrid_edu import __version__
 from semgrid_edu.errors import ArgumentError, DataError, MissingExtraError
 from semgrid_edu.fast.numba_cache import keep_compiled_functions
 from semgrid_edu.storage.files import CACHE_VARIABLE
-from semgrid_edu.workshop.commands.arguments import Commands, as_typed, check_arguments, chosen_drive, drive_in, tell
+from semgrid_edu.workshop.commands.arguments import (
+    Commands,
+    as_typed,
+    check_arguments,
+    dataset_doubts,
+    drive_in,
+    tell,
+)
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
 from semgrid_edu.workshop.commands.experiments import reproduce
@@ -55,11 +62,6 @@ def main(
 def demo(
     path: Annotated[Path | None, typer.Argument(help="The folder of a drive, or one above it.")] = None,
     reader: Annotated[Path | None, typer.Option(help="A Python file with a class that reads PATH.")] = None,
-    kitti: Annotated[Path | None, typer.Option(help="A folder of KITTI raw drives, which holds the dates.")] = None,
-    date: Annotated[str | None, typer.Option(help="Such as 2011_09_26.")] = None,
-    drive: Annotated[str | None, typer.Option(help="Such as 0013.")] = None,
-    pandaset: Annotated[Path | None, typer.Option(help="Instead, a folder of PandaSet's scenes.")] = None,
-    scene: Annotated[str | None, typer.Option(help="Such as 002.")] = None,
     camera: Annotated[
         str | None,
         typer.Option(help="KITTI: image_02 (default) or image_03. PandaSet: front_camera (default), left_camera ..."),
@@ -94,12 +96,7 @@ def demo(
     from semgrid_edu.workshop.demo import write_both_streets, write_demo
     from semgrid_edu.workshop.doubts import drive_doubts
 
-    kitti_named = {"--kitti": kitti, "--date": date, "--drive": drive}
-    pandaset_named = {"--pandaset": pandaset, "--scene": scene}
-    if path or reader:
-        chosen = drive_in(path, reader, kitti_named | pandaset_named, camera)
-    else:
-        chosen = chosen_drive(kitti_named, pandaset_named, camera)
+    chosen = drive_in(path, reader, camera)
     tell([*(drive_doubts(chosen) if chosen else ()), *(weights_doubts(weights) if weights else ())])
     options = {"stages": stages, "frames": frames, "force": force, "memory": memory}
     options |= {"save": save, "rerun": rerun}
@@ -160,7 +157,6 @@ def train(
     no-cleanup, have names of their own.
     """
     from semgrid_edu.networks.weights import weights_doubts
-    from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
     from semgrid_edu.workshop.training_run import chosen_size, chosen_truth, train_network, training_params
 
     kind = {"preset": preset, "uses_return_heights": heights, "image_size": chosen_size(image_size)}
@@ -206,7 +202,6 @@ def evaluate(
     """Score a trained network and the baselines on the test frames."""
     from semgrid_edu.networks.weights import weights_doubts
     from semgrid_edu.storage.files import check_ours, write_json
-    from semgrid_edu.workshop.commands.dataset_doubts import dataset_doubts
     from semgrid_edu.workshop.scoring.confusions import confusion_key, distance_band_names
     from semgrid_edu.workshop.scoring.evaluate import evaluate, scores_table
 

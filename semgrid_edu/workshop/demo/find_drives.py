@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from semgrid_edu.datasets.drive_files import BAGS, FROM_BAG, what_is
 from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.datasets.kitti_raw import VIEWS, KittiRawDrive
-from semgrid_edu.datasets.layouts import BAGS, FROM_BAG, what_is
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.semantic_kitti import SemanticKittiSequence
 from semgrid_edu.errors import DataError
@@ -109,7 +109,7 @@ def find_drives(path: Path) -> list[FoundDrive]:
     path = path.resolve()
     above = [folder for folder in path.parents[:2] if folder.name.endswith("_sync")]
     folders = above or [path, *_below(path, DEPTH)]
-    return [drive for folder in folders for read in READERS for drive in read(folder)]
+    return [drive for folder in folders for drive in _drives_of(folder)]
 
 
 def _below(folder: Path, depth: int) -> Iterator[Path]:
@@ -121,42 +121,23 @@ def _below(folder: Path, depth: int) -> Iterator[Path]:
             names.clear()  # os.walk goes no deeper
 
 
-def _kitti_raw(folder: Path) -> Iterator[FoundDrive]:
-    """Yield the drive of a folder such as 2011_09_26/2011_09_26_drive_0013_sync."""
+def _drives_of(folder: Path) -> Iterator[FoundDrive]:
+    """Yield the drive that a folder is, in any layout that is known."""
+    root = folder.parent.parent
     named = re.fullmatch(r"(\d{4}_\d\d_\d\d)_drive_(\d+)_sync", folder.name)
-    if named and folder.parent.name == named[1]:
-        root = folder.parent.parent
+    if named and folder.parent.name == named[1]:  # 2011_09_26/2011_09_26_drive_0013_sync
         yield FoundDrive(
             "KITTI raw", folder, lambda camera: KittiRawDrive(root, *named.groups(), view=camera or VIEWS[0])
         )
-
-
-def _pandaset(folder: Path) -> Iterator[FoundDrive]:
-    """Yield the scene of a folder that holds lidar/poses.json."""
     if (folder / "lidar" / "poses.json").is_file():
         yield FoundDrive(
             "PandaSet", folder, lambda camera: PandasetScene(folder.parent, folder.name, camera or CAMERAS[0])
         )
-
-
-def _semantic_kitti(folder: Path) -> Iterator[FoundDrive]:
-    """Yield the sequence of a folder such as sequences/00."""
-    if folder.parent.name == "sequences" and (folder / "velodyne").is_dir():
-        root = folder.parent.parent
+    if folder.parent.name == "sequences" and (folder / "velodyne").is_dir():  # sequences/00
         yield FoundDrive("SemanticKITTI", folder, _one_camera(lambda: SemanticKittiSequence(root, folder.name), folder))
-
-
-def _tracking(folder: Path) -> Iterator[FoundDrive]:
-    """Yield the run of a folder such as training/velodyne/0013."""
-    if folder.parent.name == "velodyne" and folder.parent.parent.name == "training" and folder.name.isdecimal():
-        root = folder.parent.parent.parent
-        yield FoundDrive(
-            "KITTI tracking", folder, _one_camera(lambda: KittiTrackingRun(root, int(folder.name)), folder)
-        )
-
-
-READERS = (_kitti_raw, _pandaset, _semantic_kitti, _tracking)
-"""What recognises a drive by its folder."""
+    if folder.parent.name == "velodyne" and root.name == "training" and folder.name.isdecimal():
+        run = int(folder.name)  # training/velodyne/0013
+        yield FoundDrive("KITTI tracking", folder, _one_camera(lambda: KittiTrackingRun(root.parent, run), folder))
 
 
 def _one_camera(read: Callable[[], FrameSequence], folder: Path) -> Callable[[str | None], FrameSequence]:

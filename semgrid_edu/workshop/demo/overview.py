@@ -123,7 +123,7 @@ def _draw_photos(figure: SubFigure, record: Record) -> None:
     both = yours is not None and "scores" in record.comparison.changed
     left, right, *others = figure.subplots(1, 3 if both else 2)
     near, far = plotting.DEPTH_RANGE
-    points = plotting.points_on_image(package.frame, left, size=2.0, colour_bar=False)
+    points = plotting.points_on_image(package.frame, left, size=2.0)
     colours = f"near ones ({near:g} m) yellow, far ones ({far:g} m) blue"
     points.set_title(f"LIDAR points l on the image i{chr(10) if both else ': '}{colours}")
     _draw_scores(right, package, record.label_set)

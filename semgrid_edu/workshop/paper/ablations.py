@@ -152,11 +152,8 @@ def ablations_markdown(result: dict) -> str:
     }
     near = [[row["what"], shown(row["pixel accuracy"])] for row in result["distance"]]
     tables["Accuracy by distance, cells with a semantic class, true labels"] = [["distance", "pixel accuracy"], *near]
-    sure = [_calibration_cells(row) for row in result["confidence"]]
-    tables["Expected calibration error, points"] = [["", "mean", "every seed"], *sure]
+    sure = {row["what"]: 100 * np.array(row["expected calibration error"]) for row in result["confidence"]}
+    tables["Expected calibration error, points"] = [["", "mean", "every seed"]] + [
+        [what, f"{errors.mean():.1f}", ", ".join(f"{error:.1f}" for error in errors)] for what, errors in sure.items()
+    ]
     return "\n\n".join(f"## {words}\n\n{markdown_table(lines)}" for words, lines in tables.items())
-
-
-def _calibration_cells(row: dict) -> list[str]:
-    errors = 100 * np.array(row["expected calibration error"])
-    return [row["what"], f"{errors.mean():.1f}", ", ".join(f"{error:.1f}" for error in errors)]

@@ -24,10 +24,26 @@ from semgrid_edu.workshop.paper.run import Run
 from semgrid_edu.workshop.paper.run_counts import RunCounts
 from semgrid_edu.workshop.paper.training_runs import NetworkRun
 from semgrid_edu.workshop.paper.variants import EXACT, CalibrationError
-from semgrid_edu.workshop.scoring.confusions import FrameConfusions, load_confusions, save_confusions, seed_confusions
-from semgrid_edu.workshop.scoring.counting import Grids, count_grids, reliability_key, reliability_of_sums
-from semgrid_edu.workshop.scoring.flat_ground import RULES, label_and_state
-from semgrid_edu.workshop.scoring.grids import MAJORITY, NETWORK, OCCUPANCY_ALONE, Refine, baseline_grids, network_grids
+from semgrid_edu.workshop.scoring.confusions import (
+    FrameConfusions,
+    Grids,
+    count_grids,
+    load_confusions,
+    reliability_key,
+    reliability_of_sums,
+    save_confusions,
+    seed_confusions,
+)
+from semgrid_edu.workshop.scoring.grids import (
+    MAJORITY,
+    NETWORK,
+    OCCUPANCY_ALONE,
+    RULES,
+    Refine,
+    baseline_grids,
+    label_and_state,
+    network_grids,
+)
 
 CONFUSIONS, RELIABILITY = "confusions.npz", "reliability.npz"
 """The files of a run that scores: confusion matrices by frame, and how often a method is right by its confidence."""

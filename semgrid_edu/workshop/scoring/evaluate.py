@@ -16,8 +16,13 @@ from semgrid_edu.networks import IMAGE_STAGE, SemanticGridNet
 from semgrid_edu.networks.weights import read_architecture
 from semgrid_edu.storage.files import sha256
 from semgrid_edu.storage.provenance import made_by
-from semgrid_edu.workshop.scoring.confusions import FrameConfusions, save_confusions
-from semgrid_edu.workshop.scoring.counting import GridCounts, count_grids, truths_of_frames
+from semgrid_edu.workshop.scoring.confusions import (
+    FrameConfusions,
+    GridCounts,
+    count_grids,
+    save_confusions,
+    truths_of_frames,
+)
 from semgrid_edu.workshop.scoring.grids import Refine, baseline_grids, crf_refinement, network_grids
 from semgrid_edu.workshop.scoring.score_with_interval import every_metric, markdown_table, score_with_interval, shown
 from semgrid_edu.workshop.scoring.statistics import Metric

@@ -16,9 +16,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from semgrid_edu.errors import ArgumentError
-from semgrid_edu.storage.files import table_beside
-from semgrid_edu.workshop.course.sandbox import surroundings as around
+from semgrid_edu.storage.files import atomic_path, table_beside
 from semgrid_edu.workshop.course.sandbox.limits import PARTS, Limits
 from semgrid_edu.workshop.course.sandbox.resources import (
     MEGABYTE,
@@ -34,6 +36,15 @@ from semgrid_edu.workshop.course.sandbox.resources import (
     threads_of,
 )
 from semgrid_edu.workshop.course.sandbox.values import MAX_BYTES, MAX_INPUT, Wire, check_reply, decode, encode
+
+INHERITED = ("PATH", "PYTHONPATH", "LANG", "LC_ALL", "SYSTEMROOT")
+"""The environment variables that a student's process inherits."""
+
+PREPARED = ".prepared"
+"""The folder of compiled functions, in the folder of a process; no file that is handed in gets there."""
+
+ONLY_WHOLE = shutil.ignore_patterns(".*")
+"""For copies of compiled functions: a file that another process is still writing has such a name."""
 
 WORKER = (sys.executable, "-m", "semgrid_edu.workshop.course.sandbox.worker")
 """The command that starts a worker."""
@@ -58,6 +69,56 @@ MAX_REPLY = 2 * MAX_BYTES
 
 MAX_ERROR_TEXT = 1000
 """How many characters of an error are sent back to a student's process: it may quote that process's arguments."""
+
+
+def worker_environment(folder: Path) -> dict[str, str]:
+    """Return the environment of a worker: one thread per library, and all caches in its folder.
+
+    Parameters
+    ----------
+    folder : Path
+        The fresh folder of the process.
+    """
+    here = {name: str(folder / PREPARED) for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")}
+    here |= {name: str(folder) for name in ("HOME", "TMPDIR", "IPYTHONDIR")}
+    threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+    # Freed memory is returned at once; otherwise a measurement wouldn't see that it is allocated again.
+    freed = dict.fromkeys(("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"), "1000000")
+    inline = {"MPLBACKEND": "module://matplotlib_inline.backend_inline", "PYTHONDONTWRITEBYTECODE": "1"}
+    return {name: os.environ[name] for name in INHERITED if name in os.environ} | here | threads | freed | inline
+
+
+def keep_compiled(source: Path, target: Path) -> None:
+    """Copy compiled functions to where others find them, so that a reader never gets half a file.
+
+    Parameters
+    ----------
+    source, target : Path
+        The two folders.
+    """
+
+    def replace_file(source: str, target: str) -> None:
+        with atomic_path(target) as path:
+            shutil.copyfile(source, path)
+
+    shutil.copytree(source, target, ignore=ONLY_WHOLE, copy_function=replace_file, dirs_exist_ok=True)
+
+
+def files_beside(folder: Path) -> dict[str, NDArray]:
+    """Return the files beside a notebook, their bytes by their paths, until a message is full.
+
+    Parameters
+    ----------
+    folder : Path
+        The notebook's folder.
+    """
+    found = {}
+    room = MAX_BYTES
+    for path in sorted(one for one in folder.rglob("*") if one.is_file() and not one.is_symlink()):
+        if path.suffix != ".ipynb" and PREPARED not in path.relative_to(folder).parts and path.stat().st_size <= room:
+            found[path.relative_to(folder).as_posix()] = np.fromfile(path, np.uint8)
+            room -= path.stat().st_size
+    return found
 
 
 class ProcessEndedError(Exception):
@@ -99,7 +160,7 @@ class StudentProcess:
         self.prepared, self.keeps, self.namespace = prepared, keeps, ""
         self.folder = Path(tempfile.mkdtemp(prefix="semgrid-answers-"))
         if prepared is not None:
-            shutil.copytree(prepared, self.folder / around.PREPARED, ignore=around.ONLY_WHOLE)
+            shutil.copytree(prepared, self.folder / PREPARED, ignore=ONLY_WHOLE)
         unshare = UNSHARE if _can_unshare() else ()
         self.process = self._started([*unshare, *WORKER])
         self.wire = Wire(self.process.stdout, self.process.stdin)
@@ -109,7 +170,7 @@ class StudentProcess:
         self.speaker.start()
         self.unlimited = self._limit(limits, bool(unshare))
         if beside is not None:
-            self.ask({"do": "beside", "files": around.files_beside(beside)}, time.monotonic() + START_TIMEOUT)
+            self.ask({"do": "beside", "files": files_beside(beside)}, time.monotonic() + START_TIMEOUT)
         self.namespace = namespace_of(self.process.pid)
         threading.Thread(target=self._watch, args=(limits,), daemon=True).start()
 
@@ -121,7 +182,7 @@ class StudentProcess:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             cwd=self.folder,
-            env=around.worker_environment(self.folder),
+            env=worker_environment(self.folder),
             start_new_session=True,
         )
 
@@ -245,7 +306,7 @@ class StudentProcess:
                 with suppress(OSError):
                     pipe.close()
         if self.keeps:
-            around.keep_compiled(self.folder / around.PREPARED, self.prepared)
+            keep_compiled(self.folder / PREPARED, self.prepared)
         delete_folder(self.folder)
 
     def _wait_for_descendants(self) -> None:

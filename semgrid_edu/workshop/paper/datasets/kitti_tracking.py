@@ -24,9 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
-from semgrid_edu.datasets.benchmark_calibration import BenchmarkCalibration, read_benchmark_calibration
-from semgrid_edu.datasets.calibration import camera_from
-from semgrid_edu.datasets.class_tables import ClassTable
+from semgrid_edu.datasets.calibration import BenchmarkCalibration, camera_from, read_benchmark_calibration
 from semgrid_edu.datasets.drive_files import (
     IMAGE_SUFFIXES,
     first_sound,
@@ -35,7 +33,7 @@ from semgrid_edu.datasets.drive_files import (
     numbers_in,
     photograph,
 )
-from semgrid_edu.datasets.frames import FrameSequence, nothing_known, read_scan
+from semgrid_edu.datasets.frames import ClassTable, FrameSequence, nothing_known, read_scan
 from semgrid_edu.datasets.oxts import imu_pose, parse_packet
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame, FrameLabels

@@ -24,9 +24,8 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid, lidar_from_grid, rigid_transform, transform_points
 from semgrid_edu.datasets.calibration import camera_from, check_rotation
-from semgrid_edu.datasets.class_tables import ClassTable
 from semgrid_edu.datasets.drive_files import IMAGE_SUFFIXES, frame_numbers, photograph
-from semgrid_edu.datasets.frames import FrameSequence, error_of
+from semgrid_edu.datasets.frames import ClassTable, FrameSequence, error_of
 from semgrid_edu.datasets.project_lidar import birdseye_votes, depth_scan, points_from_depth
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import LABEL_GRID, Frame, FrameLabels
