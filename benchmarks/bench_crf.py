@@ -49,7 +49,8 @@ def street(shape: tuple[int, int], seed: int, n_classes: int = N_CLASSES) -> tup
     def patches(count: int) -> NDArray:
         return np.argmax([gaussian_filter(rng.normal(size=shape), 4) for _ in range(count)], axis=0)
 
-    truth, state = patches(n_classes), patches(4)
+    truth = patches(n_classes)
+    state = patches(4)
     scores = 2 * np.eye(n_classes)[truth] + 1.5 * rng.normal(size=(*shape, n_classes))
     belief = 5 * np.eye(4)[state] + 0.5 * rng.normal(size=(*shape, 4))
     unary = unary_from_probability(softmax(scores, axis=-1).transpose(2, 0, 1))
@@ -98,7 +99,8 @@ def agreement() -> None:
     """Print how often labels are right, and how far results on a small grid lie from the written-out twin's."""
     params = CrfParams()
     unary, values, truth = street(GridSpec.paper().shape, seed=0)
-    ours, theirs = mean_field(unary, values, params), partner(unary, values, params)
+    ours = mean_field(unary, values, params)
+    theirs = partner(unary, values, params)
     accuracy = [(q.argmax(axis=0) == truth).mean() for q in (-unary, ours, theirs)]
     print("accuracy without CRF {:.3f}, mean_field {:.3f}, pydensecrf2 {:.3f};".format(*accuracy), end=" ")
     print(f"same label in {(ours.argmax(axis=0) == theirs.argmax(axis=0)).mean():.3f} of cells")
@@ -108,7 +110,8 @@ def agreement() -> None:
         ("mean_field", mean_field(unary, values, params)),
         ("pydensecrf2", partner(unary, values, params)),
     ):
-        error, same = abs(q - exact), (q.argmax(axis=0) == exact.argmax(axis=0)).mean()
+        error = abs(q - exact)
+        same = (q.argmax(axis=0) == exact.argmax(axis=0)).mean()
         print(f"  {label} against mean_field_naive, 40 x 30 cells: mean |dQ| {error.mean():.5f}, ", end="")
         print(f"max {error.max():.3f}, same label in {same:.3f} of cells")
 
@@ -127,7 +130,8 @@ def first_calls() -> None:
     """Print how long a process waits for its first result: compiled anew, and loaded from the cache on disk."""
     with tempfile.TemporaryDirectory() as folder:
         for label in ("compiled", "loaded from the cache"):
-            command, environment = [sys.executable, "-c", FIRST_CALL], {**os.environ, "NUMBA_CACHE_DIR": folder}
+            command = [sys.executable, "-c", FIRST_CALL]
+            environment = {**os.environ, "NUMBA_CACHE_DIR": folder}
             seconds = subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout
             print(f"first call, {label}: {float(seconds):.1f} s")
 

@@ -35,7 +35,8 @@ EVIDENCE = ("ground", "evidence")
 
 def frame_times(frames: list[Frame], net: SemanticGridNet) -> np.ndarray:
     """Return the milliseconds of each frame's rows, their sum, CRF and memory, (frames, rows + 3), along the drive."""
-    table, spent = [], defaultdict(float)
+    table = []
+    spent = defaultdict(float)
     with stopwatches(spent, time.perf_counter):
         for result in run_pipeline(frames, net, memory=True):
             took = result.seconds

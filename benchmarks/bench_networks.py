@@ -75,7 +75,8 @@ def matrix_product_rate(size: int = 2048) -> float:
 def inference_time(net: SemanticGridNet) -> float:
     """Return the milliseconds from image and occupancy grid to logits."""
     frame = sample_frames()[0]
-    image, occupancy = unit_image(frame.image[None]), frame.occupancy[None]
+    image = unit_image(frame.image[None])
+    occupancy = frame.occupancy[None]
     with torch.inference_mode():
         return best_times([lambda: net(image, occupancy)], ROUNDS)[0]
 
@@ -87,7 +88,9 @@ def main() -> None:
     print("network      image     fusion          image stage            grid stage           GFLOP/s  ms a frame")
     for name in SEGMENTERS:
         net = build_net(Architecture(name), camera)
-        arithmetic, stages, product = step_arithmetic(net), step_times(net), matrix_product_rate()
+        arithmetic = step_arithmetic(net)
+        stages = step_times(net)
+        product = matrix_product_rate()
         sizes = [sum(p.numel() for p in part.parameters()) for part in (net.segmenter, net.fusion)]
         steps = [
             f"{np.median(times):10.0f} ({times.min():3.0f}) {1e3 * flops / np.median(times):6.0f}"

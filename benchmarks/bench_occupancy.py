@@ -53,9 +53,11 @@ def real_drive(root: str) -> Drive:
 
 def made_up_drive(scans: int = 20, points: int = 120_000) -> Drive:
     """Return scans of a wavy wall around a plain."""
-    rng, drive = np.random.default_rng(0), []
+    rng = np.random.default_rng(0)
+    drive = []
     for _ in range(scans):
-        azimuth, distance = rng.uniform(-np.pi, np.pi, points), rng.uniform(4, 60, points)
+        azimuth = rng.uniform(-np.pi, np.pi, points)
+        distance = rng.uniform(4, 60, points)
         height = np.where(distance > 30 + 10 * np.sin(5 * azimuth), 1.0, 0.0)
         scan = np.stack([distance * np.cos(azimuth), distance * np.sin(azimuth), height], axis=1)
         drive.append((scan.astype(np.float32), PlanarMotion(0.9, 0.01, 0.003)))
@@ -68,7 +70,8 @@ def waiting_times(
     """Return the milliseconds by the clock of every step of several drives, (passes, scans), after one to warm up."""
     rows = []
     for _ in range(1 + passes):
-        tracker, clock = filter_class(spec), [time.perf_counter()]
+        tracker = filter_class(spec)
+        clock = [time.perf_counter()]
         for points, motion in drive:
             tracker.step(points, motion, LIDAR_PERIOD)
             clock.append(time.perf_counter())
@@ -79,7 +82,8 @@ def waiting_times(
 def step_times(drive: Drive, spec: GridSpec, particles: int, passes: int = 9) -> dict[str, float]:
     """Return the milliseconds of a whole step and of its parts, medians over the drive after a pass to warm up."""
     tracker = fast.Cmcdot(spec, replace(CmcdotParams(), n_particles=particles))
-    spent, rows = defaultdict(float), []
+    spent = defaultdict(float)
+    rows = []
     with stopwatches(spent, time.thread_time):
         for points, motion in drive * passes:
             spent.clear()
@@ -129,7 +133,9 @@ def print_parts(times: dict[str, float]) -> None:
 
 def print_growth(drive: Drive, base: float) -> None:
     """Print how long a step takes with more and fewer points, cells and particles, beside the same at full size."""
-    rng, paper, usual = np.random.default_rng(0), GridSpec.paper(), CmcdotParams().n_particles
+    rng = np.random.default_rng(0)
+    paper = GridSpec.paper()
+    usual = CmcdotParams().n_particles
     twice = [(np.concatenate([p, p + rng.normal(0, 0.02, p.shape).astype(p.dtype)]), m) for p, m in drive]
     finer = GridSpec(paper.x_min, paper.x_max, paper.y_min, paper.y_max, paper.cell / 2)
     coarser = replace(finer, y_min=-15.6, y_max=15.6, x_max=71.2, cell=2 * paper.cell)
@@ -151,7 +157,8 @@ def print_growth(drive: Drive, base: float) -> None:
 def print_lattices(drive: Drive, base: float) -> None:
     """Print how long a step of the BOF takes, the exact filter, with more and fewer velocities."""
     for spacing in (4.0, 2.0, 1.0):
-        lattice, rows = VelocityLattice(spacing=spacing), []
+        lattice = VelocityLattice(spacing=spacing)
+        rows = []
         tracker = Bof(GridSpec.paper(), BofParams(lattice))
         for points, motion in drive * 3:
             start = time.process_time()
@@ -163,7 +170,9 @@ def print_lattices(drive: Drive, base: float) -> None:
 
 def main() -> None:
     drive = real_drive(sys.argv[1]) if len(sys.argv) > 1 else made_up_drive()
-    points, paper, model = drive[len(drive) // 2][0], GridSpec.paper(), SensorModel()
+    points = drive[len(drive) // 2][0]
+    paper = GridSpec.paper()
+    model = SensorModel()
     size = f"grid {paper.shape}, {CmcdotParams().n_particles:,} particles"
     print(f"{len(drive)} scans of about {len(points):,} points; {size}")
     waits = waiting_times(drive, paper)

@@ -92,7 +92,8 @@ def lifted(scans: list[Scan], surface: Callable[[np.ndarray], np.ndarray]) -> li
 
 def with_mirrored(scans: list[Scan]) -> list[Scan]:
     """Push 3 returns in 1000 below the ground, as puddles and glass do; their truth is unknown."""
-    rng, mirrored = np.random.default_rng(0), []
+    rng = np.random.default_rng(0)
+    mirrored = []
     for points, height in scans:
         bad = rng.random(len(points)) < 0.003
         depth = np.where(bad, rng.uniform(0.3, 3, len(points)), 0).astype(np.float32)
@@ -125,7 +126,8 @@ def holds(points: np.ndarray, chosen: np.ndarray) -> np.ndarray:
 
 def errors(scans: list[Scan], way: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     """Count by range: cells of bare ground, of them taken for obstacles, cells with obstacles, of them missed."""
-    distance, counts = np.linalg.norm(SPEC.centers(), axis=2), np.zeros((len(BANDS), 4))
+    distance = np.linalg.norm(SPEC.centers(), axis=2)
+    counts = np.zeros((len(BANDS), 4))
     for points, true in scans:
         found = way(points)
         said = holds(points, (found >= OBSTACLE[0]) & (found <= OBSTACLE[1]))
@@ -156,7 +158,8 @@ def print_road_ahead(root: Path) -> None:
     """Print how many cells of the free road ahead on drive 0013 are taken for obstacles, a scan."""
     drive = KittiRawDrive(root, "2011_09_26", "0013")
     x, y = np.moveaxis(SPEC.centers(), -1, 0)
-    road, slope = (x > 5) & (x < 60) & (np.abs(y) < 1.8), (x > 5) & (x < 20) & (y > 3) & (y < 9)
+    road = (x > 5) & (x < 60) & (np.abs(y) < 1.8)
+    slope = (x > 5) & (x < 20) & (y > 3) & (y < 9)
     print(f"\ndrive 0013, {len(drive)} scans: cells a scan taken for obstacles    road ahead    grass slope")
     for way, function in WAYS.items():
         said = []

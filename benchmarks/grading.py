@@ -36,7 +36,8 @@ def megabytes(folder: Path) -> float:
 
 def most_memory() -> float:
     """Return how much memory this program and all that it has started hold now, megabytes."""
-    me, held = psutil.Process(), 0
+    me = psutil.Process()
+    held = 0
     for process in (me, *me.children(recursive=True)):
         with suppress(psutil.NoSuchProcess):
             held += process.memory_info().rss

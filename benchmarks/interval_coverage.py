@@ -36,7 +36,9 @@ def population(
     the rarest of four classes. The recall of a class varies on the logit scale, by the standard deviations of `RATIOS`;
     half of the variance of seeds and drives is common to all classes.
     """
-    world, own, (n_seeds, n_drives, n) = np.random.default_rng(1), np.random.default_rng([2, method]), (200, 800, 4)
+    world = np.random.default_rng(1)
+    own = np.random.default_rng([2, method])
+    (n_seeds, n_drives, n) = (200, 800, 4)
     cells = np.array([3000, 1500, 400, 120]) * world.lognormal(0, 0.8, (n_drives, n))
     cells[:, 3] *= world.random(n_drives) > 1 - rarest
     logit = np.array([2.0, 1.2, 0.6, 0.0]) + 0.1 * method
@@ -52,7 +54,8 @@ def coverage(interval: Callable, metric: Metric, *methods: NDArray, trials: int 
     """Return how often an interval of one method, or of two that are compared, holds the true value."""
     on_all_drives = zip(*(method.sum(axis=1) for method in methods), strict=True)
     truth = np.mean([np.subtract.reduce([metric(matrix) for matrix in of_seed]) for of_seed in on_all_drives])
-    rng, held = np.random.default_rng(1), 0
+    rng = np.random.default_rng(1)
+    held = 0
     for _ in range(trials):
         drawn = np.ix_(rng.integers(0, len(methods[0]), SEEDS), rng.integers(0, methods[0].shape[1], DRIVES))
         low, _, high = interval(*(method[drawn] for method in methods), metric)
@@ -63,9 +66,11 @@ def coverage(interval: Callable, metric: Metric, *methods: NDArray, trials: int 
 def resampled_interval(*arguments: NDArray | Metric) -> tuple[float, float, float]:
     """Return the middle 95 % of the mean score, or mean difference, of seeds and drives drawn with replacement."""
     *methods, metric = arguments
-    rng, values = np.random.default_rng(0), []
+    rng = np.random.default_rng(0)
+    values = []
     for _ in range(RESAMPLES):
-        seeds, times = rng.integers(0, SEEDS, SEEDS), rng.multinomial(DRIVES, np.full(DRIVES, 1 / DRIVES))
+        seeds = rng.integers(0, SEEDS, SEEDS)
+        times = rng.multinomial(DRIVES, np.full(DRIVES, 1 / DRIVES))
         scores = [np.mean([metric(np.tensordot(times, method[s], 1)) for s in seeds]) for method in methods]
         values.append(np.subtract.reduce(scores))
     return np.quantile(values, 0.025), float(np.mean(values)), np.quantile(values, 0.975)

@@ -81,8 +81,10 @@ def report_difference(ours: list, theirs: list) -> None:
 
 def counts_of(kind: str, folder: Path, rounds: list, runs: Path) -> tuple[list, list]:
     """Return what networks of each seed got that learn from one kind of scans alone, and with real frames after it."""
-    streets, everything = TrainingSet.by_camera(folder, "train"), [part for _, test in rounds for part in test]
-    alone, then = [], []
+    streets = TrainingSet.by_camera(folder, "train")
+    everything = [part for _, test in rounds for part in test]
+    alone = []
+    then = []
     for seed in SEEDS:
         start = sample_weights("segnet").with_name(IMAGE_STAGE)
         fused = learned(FUSION, start, [streets], runs / f"{kind}, {seed}", seed)

@@ -103,9 +103,16 @@ def long_run(
     """
     if min(steps, every) < 1:
         raise ArgumentError("steps, every", "at least one", f"{steps}, {every}")
-    tracker, rng, digest = Cmcdot(spec, params, seed), np.random.default_rng(seed), hashlib.sha256()
+    tracker = Cmcdot(spec, params, seed)
+    rng = np.random.default_rng(seed)
+    digest = hashlib.sha256()
     classes = ClassMemory(spec, MemoryParams(movable=(1,)))
-    time, before, worst_sum, lowest, worst_class_sum, spent = 0.0, pose_at(0.0), 0.0, 1.0, 0.0, 0.0
+    time = 0.0
+    before = pose_at(0.0)
+    worst_sum = 0.0
+    lowest = 1.0
+    worst_class_sum = 0.0
+    spent = 0.0
     done = 0
     for step in range(1, steps + 1):
         dt = 0.1 + rng.uniform(-0.004, 0.004)
@@ -115,7 +122,8 @@ def long_run(
             scene_at(time), pose.dx, pose.dy, pose.dyaw, columns=150, rings=24, field=120, noise=0.02, rng=rng
         )
         motion = PlanarMotion(*before.child_from_parent(np.array([pose.dx, pose.dy])), pose.dyaw - before.dyaw)
-        belief, before = tracker.step(points, motion, dt), pose
+        belief = tracker.step(points, motion, dt)
+        before = pose
         worst_sum = np.maximum(worst_sum, np.abs(belief.probability.sum(axis=0, dtype=np.float64) - 1).max())
         lowest = np.minimum(lowest, belief.probability.min())
         began = process_time()
@@ -128,7 +136,11 @@ def long_run(
             milliseconds = 1e3 * spent / (step - done)
             sums = float(worst_sum), float(lowest), float(worst_class_sum), milliseconds
             yield Checkpoint(step, *sums, known, resident_memory(), digest.hexdigest())
-            worst_sum, lowest, worst_class_sum, spent, done = 0.0, 1.0, 0.0, 0.0, step
+            worst_sum = 0.0
+            lowest = 1.0
+            worst_class_sum = 0.0
+            spent = 0.0
+            done = step
 
 
 def seen_ahead(belief: Belief, spec: GridSpec) -> np.ndarray:
@@ -184,7 +196,8 @@ def scene_at(time: float) -> list[Box]:
         In the world.
     """
     angles = 2 * np.pi * np.array([time / LAP + 0.11, 0.3 - time / LAP])
-    x, y = np.array([1.0, 1.12]) * RADIUS * np.sin(angles), RADIUS * (1 - np.array([1.0, 1.12]) * np.cos(angles))
+    x = np.array([1.0, 1.12]) * RADIUS * np.sin(angles)
+    y = RADIUS * (1 - np.array([1.0, 1.12]) * np.cos(angles))
     cars = [Box.around(x[k], y[k], 3, 3, 1.5) for k in range(2)]
     walked = abs(1.4 * time % 24 - 12)  # to and fro inside the circle
     return [*STANDING, *cars, Box.around(RADIUS - 16 + walked, RADIUS, 0.5, 0.5, 1.75)]
@@ -232,7 +245,8 @@ def main() -> None:
 def run(steps: int, grid: str, seed: int) -> list[Checkpoint]:
     """Run once and print a row for each tenth."""
     print("   steps  worst |sum - 1|  lowest P  of classes  ms a step  cells with velocity  memory (MB)  s    digest")
-    began, checkpoints = time.perf_counter(), []
+    began = time.perf_counter()
+    checkpoints = []
     for found in long_run(steps, max(1, steps // 10), getattr(GridSpec, grid)(), seed=seed):
         checkpoints.append(found)
         print(

@@ -45,14 +45,18 @@ def near_hedge(number: int):
 
 def with_split_beams(points: np.ndarray, rng: np.random.Generator, vehicle: tuple) -> np.ndarray:
     """Add returns that bring no light back, to the right of the vehicle's outline."""
-    x, y = rng.uniform(0, vehicle[1], SPLIT), vehicle[2] - 0.65 * rng.random(SPLIT)
+    x = rng.uniform(0, vehicle[1], SPLIT)
+    y = vehicle[2] - 0.65 * rng.random(SPLIT)
     return np.vstack([points, np.column_stack([x, y, np.ones(SPLIT), np.zeros(SPLIT)])]).astype(np.float32)
 
 
 def count(spec: GridSpec, number: int, edge: float) -> tuple[float, int, int, int]:
     """Return the hedge's distance, the frames with a fast arrow, and the hedge's hit cells: called DYNAMIC, and all."""
-    (drive, distance), sensor, rng = near_hedge(number), SensorModel(edge=edge), np.random.default_rng(number)
-    tracker, (x, y) = Cmcdot(spec, CmcdotParams(sensor=sensor)), np.moveaxis(spec.centers(), -1, 0)
+    (drive, distance) = near_hedge(number)
+    sensor = SensorModel(edge=edge)
+    rng = np.random.default_rng(number)
+    tracker = Cmcdot(spec, CmcdotParams(sensor=sensor))
+    (x, y) = np.moveaxis(spec.centers(), -1, 0)
     arrows = called = cells = 0
     for scene in known_scenes(drive, spec, f"{number}, edge {edge}"):
         belief = tracker.step(with_split_beams(scene.frame.points_grid, rng, sensor.vehicle), scene.motion, PERIOD)
@@ -74,7 +78,8 @@ def main() -> None:
     arguments = parser.parse_args()
     for edge in (SensorModel().edge, 0.0):
         rows = np.array([count(getattr(GridSpec, arguments.grid)(), n, edge) for n in range(arguments.drives)])
-        distances, (arrows, called, cells) = rows[:, 0], rows[:, 1:].sum(axis=0)
+        distances = rows[:, 0]
+        (arrows, called, cells) = rows[:, 1:].sum(axis=0)
         frames = FRAMES * arguments.drives
         away = f"{distances.min():.1f} to {distances.max():.1f} m beside"
         print(

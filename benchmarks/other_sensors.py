@@ -101,7 +101,8 @@ def scan(beams: int, slope: float, things: np.ndarray) -> np.ndarray:
         distance = np.where(flat * rays[:, 0] <= RISE_FROM, flat, rising)
         for low, high in things:
             ends = np.stack([(low - eye) / rays, (high - eye) / rays])
-            enter, leave = ends.min(axis=0).max(axis=1), ends.max(axis=0).min(axis=1)
+            enter = ends.min(axis=0).max(axis=1)
+            leave = ends.max(axis=0).min(axis=1)
             distance = np.where((enter < leave) & (enter > 0), np.minimum(distance, enter), distance)
     rng = np.random.default_rng(SEED)
     seen = (distance < 80) & (rng.random(len(rays)) > lidar.dropout)

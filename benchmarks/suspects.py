@@ -29,7 +29,9 @@ def main() -> None:
     parser.add_argument("--drives", type=int, default=4)
     parser.add_argument("--out", required=True, help="a JSON file for the counts")
     arguments = parser.parse_args()
-    began, drives, spec = datetime.now(UTC), range(arguments.drives), GridSpec.compact()
+    began = datetime.now(UTC)
+    drives = range(arguments.drives)
+    spec = GridSpec.compact()
     others = [street for street in TEST_STREETS if street not in CLOSELY]
     found = measure_suspects(spec, CLOSELY, drives) | measure_suspects(spec, others, drives, CURES)
     result = {

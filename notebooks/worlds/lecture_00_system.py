@@ -24,7 +24,10 @@ def whole_system(world: SystemWorld | None = None) -> StageGraph:
     world = world or SystemWorld()
     factors = list(street(world).factors)
     for t in range(world.steps):
-        o, s, p, g = f"o{t}", f"s{t}", f"p{t}", f"g{t}"
+        o = f"o{t}"
+        s = f"s{t}"
+        p = f"p{t}"
+        g = f"g{t}"
         history = (f"o{t - 1}",) * (t > 0)
         n = 3 ** (t + 1)
         remember = np.eye(n).reshape(*[n // 3] * (t > 0), 3, n)

@@ -96,7 +96,8 @@ def scan_boxes(
     hit = length < farthest
     length = length[hit] + (rng.normal(0, noise, hit.sum()) if noise else 0)
     points = (start * [[0], [0], [1]] + ray[:, hit] * length).T
-    cos, sin = np.cos(yaw), np.sin(yaw)
+    cos = np.cos(yaw)
+    sin = np.sin(yaw)
     points[:, :2] = points[:, :2] @ np.array([[cos, -sin], [sin, cos]])
     return points.astype(np.float32)
 

@@ -62,7 +62,10 @@ def one_cell(
     look = looking(world)
     factors = [Factor("m0", start)]
     for t, (occupied, free) in zip(steps, scans, strict=True):
-        prior, v, m, z = f"prior{t}", f"v{t}", f"m{t}", f"z{t}"
+        prior = f"prior{t}"
+        v = f"v{t}"
+        m = f"m{t}"
+        z = f"z{t}"
         this_scan = np.array([free, occupied, occupied, free]) / max(occupied, free)
         factors += [
             Factor((f"m{t - 1}", prior), M),

@@ -74,7 +74,8 @@ def scans_of(
     columns, field
         The scanner, as in `scan_boxes`.
     """
-    rng, sensor = np.random.default_rng(0), WorldModel().sensor
+    rng = np.random.default_rng(0)
+    sensor = WorldModel().sensor
     scans = [scan_boxes(boxes_at(t), columns=columns, rings=16, field=field, noise=0.02, rng=rng) for t in times]
     return [fast.scan_evidence(points, spec, sensor) for points in scans]
 
@@ -88,7 +89,8 @@ def _bus_scans() -> tuple[NDArray, list[Evidence]]:
 
 def watch(scans: list[Evidence], spec: GridSpec, params: BofParams) -> list[BofState]:
     """Return what BOF believes after each of some scans, a tenth of a second apart."""
-    state, states = BofState.nothing_known(spec, params.lattice), []
+    state = BofState.nothing_known(spec, params.lattice)
+    states = []
     for scan in scans:
         state = bof_update(bof_predict(state, spec, params, 0.1), spec, scan, params)
         states.append(state)
@@ -224,8 +226,10 @@ def draw_flanks(passed: dict[str, tuple[NDArray, NDArray]]) -> None:
 
 def sheared() -> list[tuple[str, NDArray, int | None]]:
     """Tell how a belief is sheared and picked: (caption, P(velocity, place) of shape (9, 40), cell of the return)."""
-    strip, fan = GridSpec(x_min=0, x_max=20, y_min=0, y_max=0.5, cell=0.5), VelocityLattice(max_speed=4, spacing=1)
-    rows, params = [fan.velocities.tolist().index([v, 0]) for v in range(-4, 5)], BofParams(fan, STEADY)
+    strip = GridSpec(x_min=0, x_max=20, y_min=0, y_max=0.5, cell=0.5)
+    fan = VelocityLattice(max_speed=4, spacing=1)
+    rows = [fan.velocities.tolist().index([v, 0]) for v in range(-4, 5)]
+    params = BofParams(fan, STEADY)
     occupied = np.zeros((len(fan), *strip.shape), np.float32)
     occupied[rows, 19:22] = 1 / 27
     belief = BofState(1 - occupied.sum(axis=0), 0 * occupied[0], occupied, fan.velocities, np.zeros((len(fan), 2)))

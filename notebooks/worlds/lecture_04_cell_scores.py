@@ -99,7 +99,8 @@ class CellScores:
     """
 
     def __init__(self, spec: GridSpec) -> None:
-        self.spec, self.confusion = spec, np.zeros((N_STATES, N_STATES), np.int64)
+        self.spec = spec
+        self.confusion = np.zeros((N_STATES, N_STATES), np.int64)
         self.hits: dict[str, NDArray[np.int64]] = {}
         self.errors: dict[str, list[float]] = {}
         self.smear = np.zeros(2, np.int64)
@@ -115,7 +116,8 @@ class CellScores:
             The filter's output.
         """
         truth = np.where(scene.never_seen, State.UNKNOWN, scene.truth.state)
-        scored, occupied = scene.never_seen | scene.observed, estimate.occupied > 0.5
+        scored = scene.never_seen | scene.observed
+        occupied = estimate.occupied > 0.5
         self.confusion += confusion_matrix(truth[scored], estimate.state[scored], N_STATES)
         for name, cells in hit_cell_groups(scene, self.spec):
             counted = cells.sum(), estimate.moves[cells].sum(), occupied[cells].sum()
@@ -170,7 +172,8 @@ def hit_cell_groups(scene: KnownScene, spec: GridSpec) -> Iterator[tuple[str, ND
     cells : (H, W) bool
         Its cells.
     """
-    truth, distance = scene.truth, spec.distances()
+    truth = scene.truth
+    distance = spec.distances()
     found = [number for number, frames in scene.in_view.items() if frames * PERIOD >= FOUND_AFTER - 1e-6]
     moving = scene.hit & (truth.state == State.DYNAMIC) & np.isin(truth.instance, found)
     for kind, name in MOVERS.items():

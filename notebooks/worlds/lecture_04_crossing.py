@@ -120,9 +120,11 @@ def watch(
     kind : type
         The compiled filter, or the package's.
     """
-    tracker, rng = kind(SPEC, params, seed=seed), np.random.default_rng(seed)
+    tracker = kind(SPEC, params, seed=seed)
+    rng = np.random.default_rng(seed)
     for k in range(round(seconds * 10)):
-        t, x = k / 10, speed * k / 10
+        t = k / 10
+        x = speed * k / 10
         points = scan_boxes(scene(t), x=x, columns=450, noise=0.02, rng=rng)
         yield Seen(t, x, points, tracker.step(points, PlanarMotion(dx=0.1 * speed if k else 0.0), 0.1))
 
@@ -287,7 +289,8 @@ def on_a_line(
     b[State.DYNAMIC] = np.bincount(x.astype(int), weight, minlength=6)
     b[State.STATIC, fence] = b_s
     b[State.FREE] = 1 - b.sum(axis=0)
-    position, velocity = np.column_stack([x, np.full(len(x), 0.5)]), np.column_stack([v, np.zeros(len(v))])
+    position = np.column_stack([x, np.full(len(x), 0.5)])
+    velocity = np.column_stack([v, np.zeros(len(v))])
     particles = Particles(position, velocity.astype(float), weight)
     return line, calm, FilterState(b[:, ::-1, None], particles, np.zeros(line.shape))
 
@@ -329,7 +332,8 @@ def mean_dynamic(
     scene: Callable[[float], list[Box]], thing: int, seconds: float, params: CmcdotParams = PARAMS, seed: int = 0
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the times of the scans, and the mean P(DYNAMIC) over the hit cells of a thing; NaN while it isn't seen."""
-    times, means = [], []
+    times = []
+    means = []
     for seen in watch(scene, seconds, params=params, seed=seed):
         cells = cells_in(scene(seen.time)[thing], SPEC, seen.x, margin=0.3) & hit_cells(seen.points, SPEC)
         times.append(seen.time)

@@ -78,7 +78,8 @@ def compare_filters(
 
 def _score(seed: int, drives: int, frames: int, lidar: str, grid: str) -> dict[str, object]:
     """Score the filters, with their default parameters, on all drives of one LIDAR and grid."""
-    spec, scores = GRIDS[grid], {name: CellScores(GRIDS[grid]) for name in METHODS}
+    spec = GRIDS[grid]
+    scores = {name: CellScores(GRIDS[grid]) for name in METHODS}
     read = Estimate.of_log_odds, Estimate.of_belief, Estimate.of_belief
     for number in HELD_OUT + 1000 * seed + np.arange(drives):
         drive = simulate(number, frames, rig=Rig(lidar=LIDARS[lidar]))

@@ -37,7 +37,8 @@ def three_filters(
     for k in range(0, len(by_bof), 4):
         pictures = [plotting.occupancy_colours(plotting.binary_states(by_log_odds[k]))]
         pictures += [wheel_colours(spec, b[k].probability, b[k].velocity) for b in (by_bof, by_cmcdot)]
-        b, d = 38.3 - 1.72 * k, 36.5 - 0.86 * k
+        b = 38.3 - 1.72 * k
+        d = 36.5 - 0.86 * k
         places = (0.4, 0.42 * k + 1), (4.2, b), (4.2, b + 5), (13.3, d)
         for ax, picture, name, texts in zip(axes, pictures, ("log-odds grid", "BOF", "CMCDOT"), letters, strict=True):
             ax.images[-1].set_data(picture)
@@ -108,7 +109,8 @@ def draw_crossing(
 ) -> None:
     """Draw the street with a car and a person after 2 s of filtering."""
     *_, last = watch(crossing, 2.0, params=replace(PARAMS, n_particles=particles, stop_speed=stop_speed), seed=seed)
-    belief, things = last.belief, crossing(last.time)
+    belief = last.belief
+    things = crossing(last.time)
     plotting.velocity(
         SPEC, belief.probability, belief.velocity, plotting.occupancy(SPEC, belief.probability, ax, legend)
     )

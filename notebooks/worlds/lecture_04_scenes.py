@@ -231,7 +231,8 @@ class SceneHistory:
 
     def _any_of(self, masks: list[NDArray], source: GridSpec, skip: int = 0) -> NDArray[np.bool_]:
         """Return the present cells that are in any of the masks, one per frame without the last `skip` ones."""
-        found, outside = np.zeros(self.spec.shape, bool), np.zeros(1, np.float32)
+        found = np.zeros(self.spec.shape, bool)
+        outside = np.zeros(1, np.float32)
         poses = self._poses[len(self._poses) - skip - len(masks) : len(self._poses) - skip]
         for pose, mask in zip(poses, masks, strict=True):
             motion = PlanarMotion.from_poses(pose, self._poses[-1])
@@ -260,7 +261,8 @@ def labelled_frame(drive: SimulatedDrive, k: int, birdseye: bool = True) -> Fram
     birdseye : bool
         Whether the cells have labels as well as the pixels; if not, the cells' labels are 255.
     """
-    taken, classes = drive.frame(k, labelled=birdseye), class_of_kind(KITTI_14)
+    taken = drive.frame(k, labelled=birdseye)
+    classes = class_of_kind(KITTI_14)
     kinds = taken.truth.kinds if birdseye else np.full(LABEL_GRID.shape, IGNORE, np.uint8)
     visible = taken.truth.visible if birdseye else np.zeros(LABEL_GRID.shape, bool)
     labels = FrameLabels(KITTI_14, classes[taken.picture.kind], taken.picture.depth, classes[kinds], visible)

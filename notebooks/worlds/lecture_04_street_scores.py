@@ -73,7 +73,8 @@ class StreetScores:
 
     def _add_static(self, scene: KnownScene, called: NDArray) -> None:
         """Count static things, and the phantoms among their cells."""
-        truth, (x, y) = scene.truth, np.moveaxis(self.spec.centers(), -1, 0)
+        truth = scene.truth
+        (x, y) = np.moveaxis(self.spec.centers(), -1, 0)
         hit = hit_cells(scene.frame.points_grid, self.spec, low=_LOW)
         static = hit & (truth.state == State.STATIC) & (x > _AHEAD[0]) & (x < _AHEAD[1]) & (y < _RIGHT)
         self._count("scenery", static & np.isin(truth.kind, list(SCENERY)), called)
@@ -82,7 +83,8 @@ class StreetScores:
 
     def _add_moving(self, scene: KnownScene, moves: NDArray) -> None:
         """Count moving cars and pedestrians that have been in view for long enough."""
-        truth, distance = scene.truth, self.spec.distances()
+        truth = scene.truth
+        distance = self.spec.distances()
         moving = scene.hit & (truth.state == State.DYNAMIC) & (distance < FAR)
         cars = moving & (truth.kind == Kind.CAR) & np.isin(truth.instance, self._moved_in_view(scene, CARS_AFTER))
         self._count("moving cars", cars, moves)

@@ -21,7 +21,8 @@ def ground_heights(frame: Frame, spec: GridSpec) -> NDArray[np.float64]:
     """Return the height of the ground in each cell, (H, W): a curved surface fitted to the scan's lowest returns."""
     x, y, z = frame.points_grid[:, :3].T.astype(float)
     near = (x > 5) & (x < 30) & (np.abs(y) < 6)
-    terms, z = np.stack([np.ones(near.sum()), x[near], y[near], x[near] ** 2], axis=1), z[near]
+    terms = np.stack([np.ones(near.sum()), x[near], y[near], x[near] ** 2], axis=1)
+    z = z[near]
     keep = np.abs(z) < 0.6
     for _ in range(10):
         surface = np.linalg.lstsq(terms[keep], z[keep])[0]
@@ -42,7 +43,8 @@ def lesson_of(frame: Frame, spec: GridSpec, camera: Camera) -> Lesson:
     camera : Camera
         The frame's camera at the size at which it is read.
     """
-    truth, x = frame.labels.birdseye_on(spec), spec.centers()[..., 0]
+    truth = frame.labels.birdseye_on(spec)
+    x = spec.centers()[..., 0]
     cells = frame.labels.visible_on(spec) & np.isin(truth, FLAT) & (x > 8) & (x < 25)
     on_ground = np.dstack([spec.centers(), ground_heights(frame, spec)])[cells]
     points = torch.from_numpy(transform_points(camera.T_camera_from_grid, on_ground))

@@ -138,7 +138,8 @@ def draw_maps(drawn: Drawn, ax: Axes, title: str) -> None:
     middles = [1.0 * k for k in range(len(drawn.maps))]
     for x, one in zip(middles, drawn.maps, strict=True):
         channels, h, w = one.shape
-        width, height = 0.12 + 0.36 * min(channels / 128, 1), 0.12 + 1.6 * h / full
+        width = 0.12 + 0.36 * min(channels / 128, 1)
+        height = 0.12 + 1.6 * h / full
         ax.add_patch(
             Rectangle((x - width / 2, -height / 2), width, height, facecolor=COLOURS[one.kind], edgecolor="0.2")
         )

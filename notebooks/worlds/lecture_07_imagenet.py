@@ -194,9 +194,11 @@ def learn(run: Run, frames: list[Sample], seed: int) -> Segmenter:
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, run.steps)
     for step in range(run.steps):
         batch = draw_batch(frames, BATCH_SIZE, 0.2, step, seed)
-        image, labels = batch.frames.image, batch.frames.labels
+        image = batch.frames.image
+        labels = batch.frames.labels
         if batch.mirrored:
-            image, labels = image.flip(-1), labels.flip(-1)
+            image = image.flip(-1)
+            labels = labels.flip(-1)
         optimiser.zero_grad()
         F.cross_entropy(net(image), labels, ignore_index=IGNORE).backward()
         optimiser.step()

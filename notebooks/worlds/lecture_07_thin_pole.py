@@ -278,7 +278,8 @@ def overlap(called: ArrayLike, truth: ArrayLike) -> float:
     called, truth : (n, H, W) bool or int
         1 for a pixel of a pole, else 0.
     """
-    called, truth = np.asarray(called, bool), np.asarray(truth, bool)
+    called = np.asarray(called, bool)
+    truth = np.asarray(truth, bool)
     return float((called & truth).sum() / (called | truth).sum())
 
 

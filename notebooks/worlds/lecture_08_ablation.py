@@ -175,7 +175,8 @@ def by_table(six: Streets, new: Streets, camera: Camera) -> dict[str, NDArray[np
     counts = np.zeros((256, 4, 14))
     np.add.at(counts, (ground_labels(six.scores, camera), six.o.argmax(dim=1).numpy(), six.truth.numpy()), 1)
     counts = counts[..., :N_SEMANTIC]
-    label, state = ground_labels(new.scores, camera), new.o.argmax(dim=1).numpy()
+    label = ground_labels(new.scores, camera)
+    state = new.o.argmax(dim=1).numpy()
     return {
         "always road": np.full(label.shape, KITTI_14.index("road")),
         "table of o": counts.sum(axis=0).argmax(axis=1)[state],
@@ -196,7 +197,9 @@ def simulated_streets(net: SemanticGridNet, camera: Camera, first: int, n_street
     n_streets : int
         Number of streets.
     """
-    image, belief, truth = [], [], []
+    image = []
+    belief = []
+    truth = []
     for number in tqdm(range(first, first + n_streets), desc="streets", unit="street"):
         drive = simulate(number, FRAMES_BEFORE + 1)
         frames = [labelled_frame(drive, k, birdseye=k == FRAMES_BEFORE) for k in range(FRAMES_BEFORE + 1)]
@@ -224,7 +227,8 @@ def ablation(seeds: int = 3, steps: int = 300, n_streets: int = 20) -> dict:
     dict
         "counts": by method and seed the confusion matrices of the streets, "variants", "minutes" and provenance.
     """
-    began, camera = time.perf_counter(), sample_drive().camera
+    began = time.perf_counter()
+    camera = sample_drive().camera
     net = load_net(sample_image_stage(), camera).requires_grad_(False)
     new = simulated_streets(net, camera, FIRST, n_streets)
     six = training_streets(net, camera)

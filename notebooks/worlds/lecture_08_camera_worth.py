@@ -157,7 +157,8 @@ class ImageScores(NamedTuple):
 
 @torch.inference_mode()
 def _image_scores(parts: list[Part], weights: Path) -> ImageScores:
-    planes, at_returns = [], []
+    planes = []
+    at_returns = []
     for frames, numbers in parts:
         net = load_net(weights, frames.camera)
         for k in numbers:
@@ -178,7 +179,8 @@ def network_maps(parts: list[Part], weights: Path) -> dict[str, NDArray]:
     weights : Path
         The network's file.
     """
-    logs, refined = [], []
+    logs = []
+    refined = []
     for frames, numbers in parts:
         net: SemanticGridNet = load_net(weights, frames.camera)
         refine = crf_refinement(frames.spec.cell)
@@ -225,7 +227,9 @@ def camera_worth(root: str | Path, scene: str, runs: str | Path, way: str, seed:
     runs = Path(runs) / scene
     views = open_views(root, scene, runs, image_size_of(way))
     heights = {camera: heights_of(PandasetScene(root, scene, camera), one, runs) for camera, one in views.items()}
-    scores, texts, weights = {}, {}, {}
+    scores = {}
+    texts = {}
+    weights = {}
     for split, rounds in splits(views).items():
         counts: Counts = {}
         folders = [runs / f"{split} {number}, {way}, {seed}" for number in range(len(rounds))]

@@ -141,12 +141,15 @@ def compare_real(
     of_size = {size: splits(open_views(root, scene, runs, size)) for size in sizes}
     simulated_sizes = {image_size_of(name) for name, way in WAYS.items() if way.with_simulated}
     streets = {size: TrainingSet.by_camera(simulated, "train", image_size=size) for size in simulated_sizes}
-    found, weights, seeds = {}, {}, range(seed, seed + TABLE["seeds"])
+    found = {}
+    weights = {}
+    seeds = range(seed, seed + TABLE["seeds"])
     for split, usual in of_size[Architecture.image_size].items():
         table = _joined(_count_states(*one) for one in usual)[STATE_TABLE]
         found[split] = {STATE_TABLE: _scores_of([table], table)}
         for name in TABLE["later"] if split == LATER else WAYS:
-            counted, rounds = [], of_size[image_size_of(name)][split]
+            counted = []
+            rounds = of_size[image_size_of(name)][split]
             tests = [test for _, test in rounds]
             for k in seeds if WAYS[name].params else seeds[:1]:
                 files = _networks(name, rounds, streets, runs / split, seeds, k, fabric)
@@ -225,11 +228,14 @@ def open_frames(
     image_size : (int, int)
         Height and width to which images are resized, pixels.
     """
-    root, scene, camera = drive.folder.parent, drive.folder.name, drive.view.name
+    root = drive.folder.parent
+    scene = drive.folder.name
+    camera = drive.view.name
     listed = tuple(LabelledFrame((scene, camera), k) for k in range(len(drive)))
     index = DatasetIndex(root, f"pandaset-{scene}", KITTI_14, {camera: listed}, PandasetScene, folder)
     frames = TrainingSet(index, camera, image_size=image_size)
-    spec, ignored = frames.spec, np.uint8(IGNORE)
+    spec = frames.spec
+    ignored = np.uint8(IGNORE)
     own = [np.where(drive.undecided(k, spec), drive.truth(k, spec, 0, 0), ignored) for k in range(len(drive))]
     frames.arrays["true"] = np.stack(own)
     frames.drives = tuple(f"{camera}, {int(frame.time / BLOCK)}" for frame in drive)
@@ -255,7 +261,8 @@ def _networks(
     fabric: "Fabric",
 ) -> dict[str, Path]:
     """Return the files of the weights that are learned in each round with seed k, by the names of their runs."""
-    way, files = WAYS[name], {}
+    way = WAYS[name]
+    files = {}
     for r, (training, _) in enumerate(rounds):
         of_runs = [split.with_name(f"{split.name} {r}, {way.mean_of}, {s}") / IMAGE_STAGE for s in seeds if way.mean_of]
         starts = of_runs or ([sample_weights(way.start)] if way.start else [])
@@ -314,7 +321,8 @@ def _joined(rounds: Iterable[Counted]) -> Counted:
 def _scores_of(seeds: list[list[tuple[str, GridCounts]]], table: list[tuple[str, GridCounts]]) -> dict[str, object]:
     """Return the scores of a method from its counts on each camera, by seed, beside those of the table of states."""
     kept, of_table = (on_cells(_by_block(some), "semantic", KITTI_14) for some in (seeds, [table]))
-    metrics, parts = ("pixel accuracy", "class accuracy"), [part for one in seeds for part in one]
+    metrics = ("pixel accuracy", "class accuracy")
+    parts = [part for one in seeds for part in one]
     total = kept.sum(axis=(0, 1))[: KITTI_14.n_semantic]
     diagrams = [counted.reliability[name] for name, counted in parts if name in counted.reliability]
     return {

@@ -189,7 +189,8 @@ def confusions(called: NDArray, truth: Tensor) -> NDArray[np.int64]:
     truth : (N, H, W) int64
         The true ones.
     """
-    n, true = KITTI_14.n_semantic, truth.numpy()
+    n = KITTI_14.n_semantic
+    true = truth.numpy()
     true = np.where(true < n, true, IGNORE)
     return np.stack([confusion_matrix(t, c, n) for t, c in zip(true, called, strict=True)])
 

@@ -64,7 +64,8 @@ def calls_of(name: str, methods: tuple[str, ...]) -> dict[str, dict[str, float]]
     methods : tuple of str
         The methods.
     """
-    found, counts = {}, counts_by_method()
+    found = {}
+    counts = counts_by_method()
     for method in methods:
         row = counts[method][KITTI_14.index(name)]
         shares = {other: float(row[KITTI_14.index(other)] / row.sum()) for other in ("building", "car", "road")}
@@ -130,7 +131,8 @@ def advantage(method: str, over: str) -> Interval:
     method, over : str
         The methods, values of `METHODS`.
     """
-    counts, long = _read("camera_worth.json")["counts"][UNSEEN], {short: name for name, short in METHODS.items()}
+    counts = _read("camera_worth.json")["counts"][UNSEEN]
+    long = {short: name for name, short in METHODS.items()}
     pair = []
     for name in (method, over):
         cameras = counts[long[name]].items()

@@ -34,15 +34,19 @@ def beliefs_of_boxes(drive: KittiRawDrive, beliefs: Sequence[Belief], spec: Grid
     x, y = np.moveaxis(spec.centers(), -1, 0)
     found = []
     for belief, things in zip(beliefs, read_json(drive.folder / "labels" / "objects.json").values(), strict=True):
-        moves, velocity = np.zeros(spec.shape, bool), np.zeros_like(belief.velocity)
+        moves = np.zeros(spec.shape, bool)
+        velocity = np.zeros_like(belief.velocity)
         for thing in things:
-            dx, dy = x - thing["centre"][0], y - thing["centre"][1]
-            cos, sin = np.cos(thing["yaw"]), np.sin(thing["yaw"])
+            dx = x - thing["centre"][0]
+            dy = y - thing["centre"][1]
+            cos = np.cos(thing["yaw"])
+            sin = np.sin(thing["yaw"])
             length, width, _ = np.array(thing["size"]) / 2 + MARGIN
             inside = (abs(cos * dx + sin * dy) < length) & (abs(cos * dy - sin * dx) < width) & thing["moving"]
             moves |= inside
             velocity[:, inside] = np.array(thing["velocity"])[:, None]
         probability = np.zeros_like(belief.probability)
-        probability[State.DYNAMIC], probability[State.STATIC] = moves, ~moves
+        probability[State.DYNAMIC] = moves
+        probability[State.STATIC] = ~moves
         found.append(replace(belief, probability=probability, velocity=velocity))
     return found

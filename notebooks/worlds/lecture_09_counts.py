@@ -61,7 +61,8 @@ class TruthCounts:
         """
         for name, grid in (("labels", labels), ("truth", truth), ("standing", standing)):
             check_shape(name, grid, spec.shape)
-        band, n = np.digitize(spec.distances(), BAND_EDGES[1:-1]), label_set.n_semantic
+        band = np.digitize(spec.distances(), BAND_EDGES[1:-1])
+        n = label_set.n_semantic
         chosen = (
             (truth, truth < n),
             (truth, (truth < n) & (labels == truth)),

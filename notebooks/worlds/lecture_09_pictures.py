@@ -35,7 +35,8 @@ def difference_kinds(truth: NDArray, labels: NDArray, n_semantic: int) -> NDArra
     n_semantic : int
         Number of semantic classes, which come first.
     """
-    seen, labelled = np.asarray(truth) < n_semantic, np.asarray(labels) < n_semantic
+    seen = np.asarray(truth) < n_semantic
+    labelled = np.asarray(labels) < n_semantic
     return np.select([seen & labelled & (truth == labels), seen & labelled, seen, labelled], [1, 2, 3, 4], default=0)
 
 

@@ -85,7 +85,8 @@ def score_drive(spec: GridSpec, number: int, lidar: str) -> dict[str, TruthCount
         A key of `LIDARS`.
     """
     drive = simulate(number, 2 * REACH + 1, rig=Rig(lidar=LIDARS[lidar]))
-    T, found = invert_rigid(drive.pose(REACH * PERIOD)), {}
+    T = invert_rigid(drive.pose(REACH * PERIOD))
+    found = {}
     for name, ((points, classes), label_set) in _clouds(drive).items():
         points = transform_points(T, points)
         in_grid = transform_points(drive.rig.T_grid_from_lidar, points)
@@ -95,14 +96,16 @@ def score_drive(spec: GridSpec, number: int, lidar: str) -> dict[str, TruthCount
         visible[rows[inside], cols[inside]] = True
         found[f"{name}, seen by the camera"] = np.where(visible, found[name], np.uint8(IGNORE))
     labels = labelled_frame(drive, REACH).labels
-    truth, standing = visible_labels(labels, spec), labels.birdseye_on(spec)
+    truth = visible_labels(labels, spec)
+    standing = labels.birdseye_on(spec)
     return {name: TruthCounts.of_frame(one, truth, standing, spec, KITTI_14) for name, one in found.items()}
 
 
 def _clouds(drive: SimulatedDrive) -> dict[str, tuple[tuple[NDArray, NDArray], LabelSet]]:
     """Return, by name of the way, returns and classes in the world, and the label set that says what outvotes what."""
     scans = [_labelled_scan(drive, k) for k in range(drive.n_frames)]
-    now, others = scans[REACH], [*scans[:REACH], *scans[REACH + 1 :]]
+    now = scans[REACH]
+    others = [*scans[:REACH], *scans[REACH + 1 :]]
     raw = np.concatenate([scan.points for scan in scans]), np.concatenate([scan.classes for scan in scans])
     around = f"{REACH} before and after"
     return {
@@ -123,7 +126,9 @@ def _labelled_scan(drive: SimulatedDrive, k: int) -> LabelledScan:
 
 def _cuboids(drive: SimulatedDrive, k: int) -> Cuboids:
     """Return the boxes of all road users at one instant."""
-    road, t, actors = drive.plan.road, k * PERIOD, [*drive.parked, *drive.moving]
+    road = drive.plan.road
+    t = k * PERIOD
+    actors = [*drive.parked, *drive.moving]
     turns = [Rotation.from_euler("z", actor.trajectory.pose(road, t)[1]).as_matrix() for actor in actors]
     T = [rigid_transform(turn, actor.middle(road, t)) for turn, actor in zip(turns, actors, strict=True)]
     return Cuboids(

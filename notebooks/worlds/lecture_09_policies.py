@@ -89,7 +89,8 @@ def truth_policies(seed: int = 0, drives: int = 20, grid: str = "compact", lidar
         "sums": by name of the trial the cells of `TruthCounts`, of all drives; "policies": the trials; and provenance.
         JSON can hold it.
     """
-    began, first = perf_counter(), HELD_OUT + 1000 * seed
+    began = perf_counter()
+    first = HELD_OUT + 1000 * seed
     by_drive: dict[str, dict] = {}
     sums: dict[str, NDArray] = {}
     for number in tqdm(range(first, first + drives), desc="truth policies", unit="drive"):
@@ -172,8 +173,10 @@ def score_frame(
     frames = list(frames)
     if not 0 <= k < len(frames) or frames[k].labels is None:
         raise ArgumentError("k", "the number of a labelled frame", k)
-    beliefs, labels = list(track_drive(frames, spec, seed=seed)), frames[k].labels
-    truth, standing = grid_truth(labels, beliefs[k].probability, spec), labels.birdseye_on(spec)
+    beliefs = list(track_drive(frames, spec, seed=seed))
+    labels = frames[k].labels
+    truth = grid_truth(labels, beliefs[k].probability, spec)
+    standing = labels.birdseye_on(spec)
     moments = {
         flaws: [Moment(*pair) for pair in zip(flawed_drive(frames, flaws, seed), beliefs, strict=True)]
         for flaws in {trial.flaws for trial in trials.values()}

@@ -124,7 +124,8 @@ def _drawn(frames: Sequence[Frame], spec: GridSpec, spoil: Spoil, seeds: int) ->
         for number, frame in enumerate(frames):
             returns, _ = closest_returns(frame)
             rows, cols, inside = spec.cells(frame.points_grid[returns])
-            returns, cells = returns[inside], (rows * spec.shape[1] + cols)[inside]
+            returns = returns[inside]
+            cells = (rows * spec.shape[1] + cols)[inside]
             order = np.random.default_rng([seed, number]).permutation(len(cells))
             order = order[np.argsort(cells[order], kind="stable")]
             _, first, count = np.unique(cells[order], return_index=True, return_counts=True)

@@ -69,7 +69,8 @@ def sampled_marginals(
     labels = np.array(start)
     own = -np.asarray(unary, dtype=np.float64)
     pull = own + np.stack([prices[:, labels == label].sum(axis=1) for label in range(len(own))])
-    total, counted = np.zeros_like(own), 0
+    total = np.zeros_like(own)
+    counted = 0
     for sweep in range(sweeps):
         for i, noise in enumerate(rng.gumbel(size=own.T.shape)):
             old, new = labels[i], (pull[:, i] + noise).argmax()  # the Gumbel trick: a draw from softmax(pull)

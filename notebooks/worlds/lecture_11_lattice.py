@@ -187,7 +187,8 @@ def code_of(*functions: Callable) -> Markdown:
     shown = []
     for function in functions:
         source = textwrap.dedent(inspect.getsource(function))
-        lines, body = source.splitlines(), ast.parse(source).body[0].body
+        lines = source.splitlines()
+        body = ast.parse(source).body[0].body
         documented = ast.get_docstring(ast.parse(source).body[0]) is not None
         first, last = (body[0].lineno, body[0].end_lineno) if documented else (1, 0)
         shown.append("\n".join(lines[: first - 1] + lines[last:]))

@@ -63,7 +63,8 @@ def next_point(points: list[NDArray], values: list[NDArray], seed: int) -> NDArr
     seed : int
         Seed for the sequence and for the steps.
     """
-    n, refined = len(points), len(points) - EXPLORED
+    n = len(points)
+    refined = len(points) - EXPLORED
     if refined < 0 or refined % 4 == 0:
         sequence = qmc.Halton(len(FACTORS), scramble=True, seed=seed)
         return sequence.fast_forward(n if refined < 0 else EXPLORED + refined // 4).random(1)[0]
@@ -87,11 +88,14 @@ def main(data: Path, weights: Path, trials: int = 120, seed: int = 0) -> None:
         Seed of the search.
     """
     frames = TrainingSet(data, "validation")
-    net, o, truth = load_net(weights, frames.camera), frames.arrays["occupancy"], frames.arrays["truth"]
+    net = load_net(weights, frames.camera)
+    o = frames.arrays["occupancy"]
+    truth = frames.arrays["truth"]
     log_g = np.stack([learned_log_g(net, frames[k]) for k in range(len(frames))], axis=1)  # (C, N, H, W)
     temperature = fit_temperature(log_g, truth)
     log_g = at_temperature(log_g, temperature)
-    points, values = [], []
+    points = []
+    values = []
     for _ in tqdm(range(trials), unit="trial"):
         points.append(next_point(points, values, seed))
         params = params_at(points[-1], frames.spec.cell)

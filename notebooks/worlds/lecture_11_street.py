@@ -49,7 +49,8 @@ def unrefined(spec: GridSpec) -> list[Unrefined]:
     maps = []
     for number, belief in enumerate(track_drive(frames, spec)):
         if number in FRAMES:
-            frame, o = frames[number], belief.probability
+            frame = frames[number]
+            o = belief.probability
             image = network_image(frame, net.architecture.image_size)
             log_g = stages.fuse(stages.sample(stages.segment(image)), o)
             maps.append(Unrefined(np.asarray(log_g), o, grid_truth(frame.labels, o, spec)))

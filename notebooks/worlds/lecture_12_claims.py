@@ -76,7 +76,8 @@ def claim_picture(readings: Sequence[dict]) -> Figure:
     """
     ends = {one["what"].partition(": ")[2] for one in judged(readings[0])}
     common = ends.pop() if len(ends) == 1 else ""
-    rows, size = len(judged(readings[0])), (2.4 + 2.3 * len(readings), 2 + 0.42 * len(judged(readings[0])))
+    rows = len(judged(readings[0]))
+    size = (2.4 + 2.3 * len(readings), 2 + 0.42 * len(judged(readings[0])))
     figure, axes = plt.subplots(
         1, len(readings), figsize=size, sharex=True, sharey=True, layout="constrained", squeeze=False
     )

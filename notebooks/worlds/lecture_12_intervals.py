@@ -131,7 +131,8 @@ def some_drives(rng: np.random.Generator, n: int, share: float) -> NDArray[np.in
     cells = np.stack([np.full(n, 2000), 100 * (rng.random(n) < share)], axis=1)
     recall = 1 / (1 + np.exp(-np.array([1.5, 0.0]) - rng.normal(0, 0.8, (n, 2))))
     hits = rng.binomial(cells, recall)
-    (a, b), (x, y) = hits.T, (cells - hits).T
+    (a, b) = hits.T
+    (x, y) = (cells - hits).T
     return np.array([[a, x], [y, b]]).transpose(2, 0, 1)
 
 
@@ -158,7 +159,8 @@ def tried(share: float, interval: Callable, metric: Callable, n: int = 20, trial
         each side.
     """
     truth = metric(some_drives(np.random.default_rng(0), 100_000, 0.99).sum(axis=0))
-    rng, found = np.random.default_rng(1), []
+    rng = np.random.default_rng(1)
+    found = []
     for _ in range(trials):
         matrices = some_drives(rng, n, share)
         low, _, high = interval(matrices, metric)
@@ -209,7 +211,8 @@ def by_seed(experiment: str, network: str, labels: str, seeds: int) -> NDArray:
         Number of seeds; the first ones.
     """
     kept = np.load(RESULTS / "reduced" / f"{experiment}_counts.npz")
-    scored, of = f"score-minikitti-{network}-500+500-seed", f"/network, {labels} labels, all distances"
+    scored = f"score-minikitti-{network}-500+500-seed"
+    of = f"/network, {labels} labels, all distances"
     ends = [f"-on-minikitti-test-lidar{refined}{of}" for refined in ("-crf", "")]
     return np.stack(
         [kept[f"{scored}{seed}{end}"] for seed in range(seeds) for end in ends if f"{scored}{seed}{end}" in kept]

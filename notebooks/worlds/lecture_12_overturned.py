@@ -116,8 +116,10 @@ def compare_pairs() -> dict[str, object]:
         "called car": the share of the cells with an interval over drives, for each way, and their "difference";
         "counts": cells and cells called car by drive; and what made them.
     """
-    weights, net = sample_weights(), None
-    seed, seeds = FIRST_SEED, []
+    weights = sample_weights()
+    net = None
+    seed = FIRST_SEED
+    seeds = []
     matrices: dict[str, list[NDArray]] = {name: [] for name in CASTS}
     bar = trange(N_PAIRS, unit="pair")
     while len(seeds) < N_PAIRS:

@@ -101,7 +101,8 @@ def main(runs: Path, out: Path, device: str = "cpu") -> None:
         Where networks are trained.
     """
     scale = SCALES["reduced"]
-    pairs, counted = structure_runs(scale, scale.seeds), RunCounts(runs)
+    pairs = structure_runs(scale, scale.seeds)
+    counted = RunCounts(runs)
     runs.mkdir(parents=True, exist_ok=True)
     with workplace() as place:
         failed = execute_plan(with_needs(run for some in pairs.values() for run in some), runs, place, device)

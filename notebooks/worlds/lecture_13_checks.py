@@ -130,7 +130,8 @@ def ground_plane(points: NDArray, height: float) -> GroundPlane:
 
 def _robust_plane(a: NDArray, b: NDArray, c: NDArray, rounds: int, least: float) -> tuple[NDArray, NDArray]:
     """Fit c = p0 + p1 a + p2 b without outliers; return p and the distances of all points."""
-    columns, kept = np.column_stack([np.ones(len(a)), a, b]), np.ones(len(a), np.bool_)
+    columns = np.column_stack([np.ones(len(a)), a, b])
+    kept = np.ones(len(a), np.bool_)
     for _ in range(rounds):
         plane = np.linalg.lstsq(columns[kept], c[kept])[0]
         error = np.abs(c - columns @ plane)
@@ -250,6 +251,8 @@ def axes_errors(frames: Sequence[Frame], apart: int = 5, thin: int = 1) -> dict[
         raise ArgumentError("apart", f"1 to {len(frames) - 1} for {len(frames)} frames", apart)
     errors = []
     for before, now in pairs:
-        tree, points, T = KDTree(standing_points(before)), standing_points(now)[::thin], motion_between(before, now)
+        tree = KDTree(standing_points(before))
+        points = standing_points(now)[::thin]
+        T = motion_between(before, now)
         errors.append([_median_distance(tree, points, mistake(T)) for mistake in AXES.values()])
     return dict(zip(AXES, np.mean(errors, axis=0).tolist(), strict=True))

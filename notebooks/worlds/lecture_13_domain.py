@@ -139,7 +139,8 @@ def distances(images: Sequence[NDArray], known: Sequence[NDArray]) -> dict[str, 
     dict of str to float
         "colour distance" and "edge distance": total variation of the mean histograms, 0..1.
     """
-    seen, learned = mean_histograms(images), mean_histograms(known)
+    seen = mean_histograms(images)
+    learned = mean_histograms(known)
     edges = float(total_variation(seen["edges"], learned["edges"]))
     return {"colour distance": colour_distance(seen, learned), "edge distance": edges}
 
@@ -237,7 +238,9 @@ def network_numbers(net: "SemanticGridNet", frames: Sequence[Frame], matched: bo
         Means over the frames: "confidence", of the most probable class, and "entropy", see `normalised_entropy`, over
         pixels; "lane" and "standing", see `Agreement`.
     """
-    size, reference, found = net.architecture.image_size, np.stack(training_images()), []
+    size = net.architecture.image_size
+    reference = np.stack(training_images())
+    found = []
     for frame in frames:
         image = resize_image(frame.need_image(), size)
         p = class_probabilities(net, match_colours(image, reference) if matched else image)

@@ -36,8 +36,10 @@ def fusion_inputs(net: SemanticGridNet, frames: Sequence[Frame], beliefs: Sequen
     beliefs : sequence of (4, H, W) float
         Their occupancy grids.
     """
-    size, spec = net.architecture.image_size, net.architecture.grid
-    planes, camera = [], None
+    size = net.architecture.image_size
+    spec = net.architecture.grid
+    planes = []
+    camera = None
     beside = [np.stack(beliefs)]
     if net.uses_return_heights:
         beside.append(np.stack([cell_heights(frame.points_grid, spec) for frame in frames]))
@@ -127,9 +129,11 @@ def with_rows(frame: Frame, rows: int, above: bool = False, content: ArrayLike |
     content : (rows, w, 3) int or what broadcasts to it, optional
         What added rows show, 0..255, in place of copies.
     """
-    image, K = frame.need_image(), frame.camera.K.copy()
+    image = frame.need_image()
+    K = frame.camera.K.copy()
     if above:
-        image, K[1, 2] = image[::-1], K[1, 2] + rows
+        image = image[::-1]
+        K[1, 2] = K[1, 2] + rows
     image = image[:rows] if rows < 0 else np.concatenate([image, np.repeat(image[-1:], rows, axis=0)])
     if content is not None and rows > 0:
         image[-rows:] = content

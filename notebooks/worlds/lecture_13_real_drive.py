@@ -54,7 +54,8 @@ def compare_drives(roots: Sequence[Path], date: str, drive: str) -> dict[str, ob
     dict
         What `measure_drive` and `drive_readings` return for each drive, by name, and how it was made; JSON can hold it.
     """
-    began, known = perf_counter(), domain.mean_histograms(domain.training_images())
+    began = perf_counter()
+    known = domain.mean_histograms(domain.training_images())
     drives = {"sample": (sample_drive(), sample_boxes(sample_drive()))}
     for number, root in enumerate(roots, 1):
         boxes = read_boxes(root / f"moving_cars_{drive}.json")
@@ -89,7 +90,8 @@ def measure_drive(drive: KittiRawDrive, boxes: Boxes) -> dict[str, object]:
     dict
         Numbers of the drive, of its ground, motion, images, networks and grids; JSON can hold it.
     """
-    frames, net = drive[:], load_net(sample_image_stage(), drive.camera)
+    frames = drive[:]
+    net = load_net(sample_image_stage(), drive.camera)
     scanned = checks.with_scan(frames)
     positions = np.array([frame.T_world_from_lidar[:3, 3] for frame in frames])
     planes = [checks.ground_plane(frame.points, frame.camera.lidar_height) for frame in scanned[::EVERY]]
@@ -119,7 +121,9 @@ def _grid_numbers(frames: Sequence[Frame], boxes: Boxes) -> dict[str, object]:
     grid; "moving cells" is how many cells of moving cars were hit, and "found" the share of them called DYNAMIC.
     """
     net = load_net(sample_weights(), frames[0].camera)
-    states, semantic, found = [], [], []
+    states = []
+    semantic = []
+    found = []
     for k, result in enumerate(run_pipeline(frames, net)):
         if k >= SETTLED:
             likely = result.belief.probability.argmax(axis=0)
@@ -206,7 +210,8 @@ def sample_boxes(drive: KittiRawDrive) -> Boxes:
     for frame, things in known.items():
         for thing in things:
             if thing["moving"] and thing["class"] == "car":
-                (x, y, _), (length, width, _) = thing["centre"], thing["size"]
+                (x, y, _) = thing["centre"]
+                (length, width, _) = thing["size"]
                 boxes.setdefault(int(frame), []).append([x - length / 2, x + length / 2, y - width / 2, y + width / 2])
     return boxes
 
@@ -226,7 +231,8 @@ def moving_hits(frame: Frame, belief: Belief, boxes: Iterable[Sequence[float]], 
         The grid.
     """
     x, y = np.moveaxis(spec.centers(), -1, 0)
-    hit, inside = hit_cells(frame.points_grid, spec), np.zeros(spec.shape, np.bool_)
+    hit = hit_cells(frame.points_grid, spec)
+    inside = np.zeros(spec.shape, np.bool_)
     for x_min, x_max, y_min, y_max in boxes:
         inside |= (x > x_min) & (x < x_max) & (y > y_min) & (y < y_max)
     return (belief.probability[State.DYNAMIC] > belief.probability[State.STATIC])[hit & inside]

@@ -103,14 +103,18 @@ def check_lines(drive: FrameSequence, frames: Sequence[Frame]) -> list[Line]:
     frames : sequence of Frame
         Its frames with scan and image, more than five.
     """
-    times, errors = [frame.time for frame in frames], checks.axes_errors(frames, thin=3)
+    times = [frame.time for frame in frames]
+    errors = checks.axes_errors(frames, thin=3)
     contrast = np.mean([edge_contrast(frame, YAWS) for frame in frames[::3]], axis=0)
     null = np.mean([edge_contrast(image_mirrored(frame), YAWS) for frame in frames[::3]], axis=0).max()
     ground = np.mean([checks.ground_plane(frame.points, frame.camera.lidar_height) for frame in frames], axis=0)
-    problems, gaps, best = len(drive.problems()), len(checks.time_gaps(times)), YAWS[contrast.argmax()]
+    problems = len(drive.problems())
+    gaps = len(checks.time_gaps(times))
+    best = YAWS[contrast.argmax()]
     far = float(np.linalg.norm(motion_between(frames[0], frames[-1])[:3, 3]))
     borders = f"best at {best:+.2f}°, contrast {contrast.max():.2f}"
-    lean, cause = [bool(abs(angle) <= LEANS) for angle in ground[1:]], "whether LIDAR or street"
+    lean = [bool(abs(angle) <= LEANS) for angle in ground[1:]]
+    cause = "whether LIDAR or street"
     return [
         Line("files", f"{problems} problems", problems == 0, "wrong numbers in whole files"),
         Line(
@@ -204,7 +208,9 @@ def map_lines(name: str, truths: NDArray, grids: NDArray, rivals: Mapping[str, N
     pieces : (F, H, W) int
         From `street_pieces`.
     """
-    ours, accuracy, lines = piece_confusions(truths, grids.argmax(axis=1), pieces), METRICS["pixel accuracy"], []
+    ours = piece_confusions(truths, grids.argmax(axis=1), pieces)
+    accuracy = METRICS["pixel accuracy"]
+    lines = []
     right = 100 * drive_interval(ours, accuracy).mean
     for rival, called in rivals.items():
         low, gain, high = paired_interval(ours, piece_confusions(truths, called, pieces), accuracy)

@@ -57,7 +57,8 @@ def depth_edges(points: NDArray, jump: float = 0.5) -> NDArray[np.float64]:
     """
     points = ring_by_ring(np.asarray(points[:, :3], dtype=np.float64))
     distance = np.linalg.norm(points, axis=1)
-    nearer, edge = np.diff(distance) * _successive_neighbours(points), np.zeros(len(points), np.bool_)
+    nearer = np.diff(distance) * _successive_neighbours(points)
+    edge = np.zeros(len(points), np.bool_)
     edge[1:] |= nearer < -jump
     edge[:-1] |= nearer > jump
     return points[edge]

@@ -81,7 +81,8 @@ def class_over_time(world: MemoryWorld | None = None) -> StageGraph:
     world = world or MemoryWorld()
     factors = []
     for t in range(world.steps):
-        m, e = f"m{t}", f"e{t}"
+        m = f"m{t}"
+        e = f"e{t}"
         factors += [
             Factor((f"m{t - 1}", m), world.street.change()) if t else Factor(m, STREET),
             Factor((f"e{t - 1}", e), world.errs_again()) if t else Factor(e, world.errors()),

@@ -109,7 +109,8 @@ def count_cells(probability: NDArray, truth: NDArray) -> CellCounts:
     truth : (N,) uint8
         Their classes.
     """
-    n, semantic = len(probability), probability[: KITTI_14.n_semantic]
+    n = len(probability)
+    semantic = probability[: KITTI_14.n_semantic]
     confusion, forbidden = (confusion_matrix(truth, of.argmax(axis=0), n) for of in (probability, semantic))
     if not len(truth):
         return CellCounts(confusion, forbidden, np.zeros((3, 15)), 0.0)
@@ -140,7 +141,8 @@ class GainCounts:
         grids : sequence of F dict of str to (C, H, W) float
             What the methods make of each, by name.
         """
-        since, until = frames_since_seen(frames, self.spec), frames_since_seen(frames[::-1], self.spec)[::-1]
+        since = frames_since_seen(frames, self.spec)
+        until = frames_since_seen(frames[::-1], self.spec)[::-1]
         truth = np.stack([one.labels.birdseye_on(self.spec) for one in frames])
         looks = last_looks(frames, [grid[ONE] for grid in grids], since, self.spec)
         groups = self._groups(since, until, frames_in_view(frames, self.spec), truth != IGNORE)
@@ -181,8 +183,10 @@ def _gain(stacked: dict[str, NDArray], forbidden: dict[str, NDArray], better: st
 
 def _method(counts: Sequence[CellCounts], confusions: NDArray) -> dict[str, object]:
     """Return the scores of one method in one group of cells."""
-    total, cells = confusions.sum(axis=(0, 1)), confusions.sum()
-    of_class, sums = np.maximum(total.sum(axis=1), 1), sum(one.by_confidence for one in counts)
+    total = confusions.sum(axis=(0, 1))
+    cells = confusions.sum()
+    of_class = np.maximum(total.sum(axis=1), 1)
+    sums = sum(one.by_confidence for one in counts)
     return {
         **{key: score_with_interval(confusions, METRICS[key]) for key in (PIXEL, CLASS)},
         FORBIDDEN: float(sum(np.trace(one.forbidden) for one in counts) / cells),

@@ -133,7 +133,8 @@ def measure_memory(pandaset: str | Path, scene: str = "002", seed: int = 0, driv
         "scores": for fresh simulated streets, for the sample drive, and for the real scene with two networks, by group
         of cells; "worth": what one more frame is worth on the fresh streets; and all that made them. JSON can hold it.
     """
-    began, spec = perf_counter(), GridSpec.compact()
+    began = perf_counter()
+    spec = GridSpec.compact()
     blocks = [block for camera in CAMERAS for block in real_blocks(PandasetScene(pandaset, scene, camera))]
     simulated = (_simulated(number) for number in range(HELD_OUT + 1000 * seed, HELD_OUT + 1000 * seed + drives))
     fresh, views = _scored(simulated, sample_weights(), spec)
@@ -173,7 +174,8 @@ def real_blocks(frames: Iterable[Frame]) -> list[list[Frame]]:
 
 def _scored(drives: Iterable[list[Frame]], weights: Path, spec: GridSpec) -> tuple[dict, list[list[View]]]:
     """Return the scores of some drives, and their views without images and returns."""
-    counts, kept = GainCounts(spec), []
+    counts = GainCounts(spec)
+    kept = []
     for frames in tqdm(drives, desc="memory", unit="drive"):
         views, grids = grids_of(frames, weights)
         counts.add(frames, grids)
@@ -230,7 +232,8 @@ def worth_by_distance(
         Distances between the bands, metres.
     """
     distance = spec.distances()
-    loss, cells = np.zeros((len(worths), len(edges) - 1)), np.zeros(len(edges) - 1, np.int64)
+    loss = np.zeros((len(worths), len(edges) - 1))
+    cells = np.zeros(len(edges) - 1, np.int64)
     for k, worth in enumerate(worths):
         params = MemoryParams(near_exponent=worth, decay_distance=1e9)
         for views in drives:

@@ -233,8 +233,13 @@ class SimulatedDrive:
 
     def _labelled_scan(self, t: float, rng: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
         """Record the scan in which the LIDAR points ahead at time t, and what each return hit."""
-        world, pose = (lambda after: self.instant(t + after)), (lambda after: self.pose(t + after))
-        return labelled_scan(world, pose, self.rig.lidar, self.plan.road, rng)
+        return labelled_scan(
+            lambda after: self.instant(t + after),
+            lambda after: self.pose(t + after),
+            self.rig.lidar,
+            self.plan.road,
+            rng,
+        )
 
     def _noise(self, *key: int) -> np.random.Generator:
         """Return this drive's random generator for a key, such as the number of a frame."""

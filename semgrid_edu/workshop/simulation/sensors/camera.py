@@ -49,7 +49,8 @@ def _discontinuities(triangle: NDArray, distance: NDArray, kind: NDArray, materi
     """Mark the edges to antialias: each pixel that differs from its right or lower neighbour, and that neighbour."""
     edge = np.zeros(triangle.shape, bool)
     for here, beside in ((np.s_[:, :-1], np.s_[:, 1:]), (np.s_[:-1], np.s_[1:])):
-        a, b = triangle[here], triangle[beside]
+        a = triangle[here]
+        b = triangle[beside]
         near = np.minimum(distance[here], distance[beside]).astype(np.float64)
         jump = (a < 0) | (b < 0) | (kind[a] != kind[b]) | (material[a] != material[b])
         jump |= np.abs(distance[here] - distance[beside]) > 0.05 * near

@@ -121,7 +121,8 @@ class PorousMesh(RayMesh):
         triangle : (M,) int32
             The triangles that stop them.
         """
-        rays, start = np.arange(len(ends)), np.zeros(len(ends), np.float32)
+        rays = np.arange(len(ends))
+        start = np.zeros(len(ends), np.float32)
         rays, start, crossing, triangle = self._next(origins, directions, rays, start)
         budget = np.zeros(len(ends), np.float32)
         budget[rays] = rng.standard_exponential(len(rays), dtype=np.float32)
@@ -240,7 +241,8 @@ class Instant:
         origins = np.empty_like(directions)
         origins[:] = origin
         hits = self.static.embree.run(origins, directions, output=1)
-        distance, triangle = hits["tfar"], hits["primID"]
+        distance = hits["tfar"]
+        triangle = hits["primID"]
         distance[triangle < 0] = MISS
         if self.moving:
             closer = self.moving.embree.run(origins, directions, output=1)
@@ -249,7 +251,8 @@ class Instant:
             triangle[nearer] = closer["primID"][nearer] + len(self.static.instance)
         if self.porous:
             rays, at, face = self.porous.stop(origins, directions, distance, rng)
-            distance[rays], triangle[rays] = at, face + len(self.instance) - len(self.porous.opacity)
+            distance[rays] = at
+            triangle[rays] = face + len(self.instance) - len(self.porous.opacity)
         position = origins + np.minimum(distance, 1e4)[:, None] * directions
         return Hits(directions, distance, triangle, position)
 

@@ -77,7 +77,8 @@ class Lidar:
         """(N, 3) float32: unit vectors in the LIDAR frame, laser by laser from the top, each from left to right."""
         azimuth = np.radians(self.azimuths)
         elevation = np.radians(self.elevations)[:, None]
-        x, y = np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth)
+        x = np.cos(elevation) * np.cos(azimuth)
+        y = np.cos(elevation) * np.sin(azimuth)
         return np.stack([x, y, np.sin(elevation) + 0 * azimuth], axis=-1).reshape(-1, 3).astype(np.float32)
 
 
@@ -215,7 +216,8 @@ class Geodesy:
         rng : numpy.random.Generator
             Source of randomness.
         """
-        north, east = float(rng.uniform(0, 0.05)), float(rng.uniform(0, 0.05))
+        north = float(rng.uniform(0, 0.05))
+        east = float(rng.uniform(0, 0.05))
         return cls(49.0 + north, 8.4 + east, 114.0, float(rng.uniform(-3.1, 3.1)))
 
     @property

@@ -59,7 +59,9 @@ def _grass(tile, x, y, blur, out):
     tuft = texture(tile, 6.0 * x, 6.0 * y + 13.0) - 0.5
     dry = texture(tile, 0.8 * x + 7.0, 0.8 * y)
     light = 1.0 + 0.8 * blade + 0.6 * tuft
-    red, green, blue = 0.075 + 0.09 * dry * dry, 0.135 + 0.03 * dry, 0.035 + 0.02 * dry
+    red = 0.075 + 0.09 * dry * dry
+    green = 0.135 + 0.03 * dry
+    blue = 0.035 + 0.02 * dry
     out[0] = red * light
     out[1] = green * light
     out[2] = blue * light
@@ -88,7 +90,8 @@ def _surface(tile, material, p, n, blur, out):
     u = -n[1] * p[0] + n[0] * p[1]
     v = p[2]
     if abs(n[2]) > 0.9:
-        u, v = p[0], p[1]
+        u = p[0]
+        v = p[1]
     fade = 1.0 / (1.0 + 5.0 * blur)
     gain = 1.0
     if material == Material.PLASTER:
@@ -118,7 +121,9 @@ def _mirror(tile, ray, n, light, gloss, strength, out):
     """Add the reflections of a glossy surface: sky above the horizon, dark street below it, and sun highlight."""
     sun, sun_colour, _, horizon, _, _, _ = light
     cos = -(ray[0] * n[0] + ray[1] * n[1] + ray[2] * n[2])
-    rx, ry, rz = ray[0] + 2 * cos * n[0], ray[1] + 2 * cos * n[1], ray[2] + 2 * cos * n[2]
+    rx = ray[0] + 2 * cos * n[0]
+    ry = ray[1] + 2 * cos * n[1]
+    rz = ray[2] + 2 * cos * n[2]
     fresnel = strength + (1.0 - strength) * (1.0 - max(cos, 0.0)) ** 5
     seen = np.empty(3, np.float32)
     if rz > 0.12:

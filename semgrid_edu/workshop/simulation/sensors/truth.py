@@ -93,7 +93,8 @@ def _pixel(T, K, x, y, z):
 def _agrees(u, v, z, tolerance, reach, kind, kinds, depth):
     """Return whether a pixel within `reach` of (u, v) shows this kind at this depth."""
     height, width = depth.shape
-    row, col = round(v), round(u)
+    row = round(v)
+    col = round(u)
     if row < 0 or col < 0 or row >= height or col >= width:
         return False
     for r in range(max(row - reach, 0), min(row + reach + 1, height)):

@@ -74,7 +74,8 @@ def add_junction_signs(builder: Builder) -> None:
         builder.try_post(shape, road.junction + sign * back, sign * (road.side(sign).edge + 0.5), yaw, Kind.SIGN, 0.09)
     for sign in filter(road.leaves, (1, -1)):
         shape = roadside.traffic_light(not green) if lights else roadside.sign("stop")
-        s, d = road.junction + sign * (road.side_half + 0.5), sign * (road.side(sign).edge + road.corner + 0.5)
+        s = road.junction + sign * (road.side_half + 0.5)
+        d = sign * (road.side(sign).edge + road.corner + 0.5)
         builder.try_post(shape, s, d, -sign * np.pi / 2, Kind.SIGN, 0.09)
 
 

@@ -76,7 +76,8 @@ class Builder:
             Height of the object, metres.
         """
         position, angle = self.place(s, d, yaw)
-        c, n = np.cos(angle), np.sin(angle)
+        c = np.cos(angle)
+        n = np.sin(angle)
         x = position[0] + c * offset[0] - n * offset[1]
         y = position[1] + n * offset[0] + c * offset[1]
         sides = [max(h, THIN) for h in half]

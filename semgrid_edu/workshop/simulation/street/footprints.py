@@ -45,7 +45,8 @@ class Footprint(NamedTuple):
 @njit(cache=True)
 def _inside(f, x, y):
     """Return whether the point (x, y) is inside the footprint f, a row of numbers."""
-    c, s = np.cos(f[4]), np.sin(f[4])
+    c = np.cos(f[4])
+    s = np.sin(f[4])
     u = abs(c * (x - f[0]) + s * (y - f[1])) / f[2]
     v = abs(c * (y - f[1]) - s * (x - f[0])) / f[3]
     if u > 1.0 or v > 1.0:
@@ -76,7 +77,8 @@ def stamp(footprints: NDArray, xy: NDArray, cell: float, which: NDArray) -> None
     # a compiled loop, because each footprint visits only the few cells around it, not the whole grid
     for k in range(len(footprints)):
         f = footprints[k]
-        dx, dy = f[0] - origin[0], f[1] - origin[1]
+        dx = f[0] - origin[0]
+        dy = f[1] - origin[1]
         row = -(dx * ex[0] + dy * ex[1]) / cell
         col = -(dx * ey[0] + dy * ey[1]) / cell
         reach = np.hypot(f[2], f[3]) / cell + 1.0
@@ -114,7 +116,8 @@ def outline(footprint: Footprint, margin: float = 0.0) -> NDArray[np.float64]:
     """
     f = footprint
     angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
-    c, s = np.cos(angle), np.sin(angle)
+    c = np.cos(angle)
+    s = np.sin(angle)
     radius = (np.abs(c) ** f.exponent + np.abs(s) ** f.exponent) ** (-1 / f.exponent)
     local = np.stack([(f.half_length + margin) * radius * c, (f.half_width + margin) * radius * s], axis=1)
     turn = np.array([[np.cos(f.yaw), np.sin(f.yaw)], [-np.sin(f.yaw), np.cos(f.yaw)]])

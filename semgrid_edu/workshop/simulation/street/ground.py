@@ -89,11 +89,15 @@ def on_wheels(road: Road, s: float, d: float, yaw: float, length: float, width: 
         Tilt, rad: positive when the left wheels, or the rear wheels, are higher.
     """
     x, y, _ = to_world(road, s, d)
-    along, across, total = 0.0, 0.0, 0.0
-    c, n = np.cos(yaw), np.sin(yaw)
+    along = 0.0
+    across = 0.0
+    total = 0.0
+    c = np.cos(yaw)
+    n = np.sin(yaw)
     for ahead in (-1, 1):
         for left in (-1, 1):
-            u, v = ahead * length / 2, left * width / 2
+            u = ahead * length / 2
+            v = left * width / 2
             wheel = to_road(road, x + c * u - n * v, y + n * u + c * v)
             height = ground_height(road, wheel[0], wheel[1])
             total += height
@@ -235,6 +239,9 @@ def ground_mesh(road: Road, start: float, end: float) -> Shape:
         d = d[np.sign(road.curvature) * d < inner]
     vertices = _vertices(road, s, d)
     index = np.arange(len(s) * len(d)).reshape(len(s), len(d))
-    a, b, c, e = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    a = index[:-1, :-1]
+    b = index[1:, :-1]
+    c = index[1:, 1:]
+    e = index[:-1, 1:]
     faces = np.stack([a, b, c, a, c, e], axis=-1).reshape(-1, 3)
     return shape(vertices.reshape(-1, 3), faces, (0.2, 0.2, 0.2), Material.GROUND, Kind.ROAD)

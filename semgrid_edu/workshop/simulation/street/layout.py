@@ -138,7 +138,8 @@ def to_world(road: Road, s: float, d: float) -> tuple[float, float, float]:
     x = s1 + np.sin(heading) / k
     y = (1.0 - np.cos(heading)) / k
     ahead = max(s - road.bend_end, 0.0)
-    c, n = np.cos(heading), np.sin(heading)
+    c = np.cos(heading)
+    n = np.sin(heading)
     return x + ahead * c - d * n, y + ahead * n + d * c, heading
 
 
@@ -163,13 +164,16 @@ def to_road(road: Road, x: float, y: float) -> tuple[float, float]:
     if x <= s1 or k == 0.0:
         return x, y
     sign, radius = (1.0, 1.0 / k) if k > 0 else (-1.0, -1.0 / k)
-    x0, y0 = x - s1, sign * y
+    x0 = x - s1
+    y0 = sign * y
     angle = np.arctan2(x0, radius - y0)
     end = sign * k * (road.bend_end - s1)
     if angle <= end:
         return s1 + angle * radius, sign * (radius - np.hypot(x0, y0 - radius))
-    c, n = np.cos(end), np.sin(end)
-    x1, y1 = x0 - radius * n, y0 - radius * (1.0 - c)
+    c = np.cos(end)
+    n = np.sin(end)
+    x1 = x0 - radius * n
+    y1 = y0 - radius * (1.0 - c)
     return road.bend_end + c * x1 + n * y1, sign * (c * y1 - n * x1)
 
 

@@ -109,10 +109,14 @@ def texture(tile, u, v):
     u, v : float
         The place, texels.
     """
-    i, j = np.floor(u), np.floor(v)
-    a, b = np.float32(u - i), np.float32(v - j)
-    i0, j0 = int(i) & 511, int(j) & 511
-    i1, j1 = (i0 + 1) & 511, (j0 + 1) & 511
+    i = np.floor(u)
+    j = np.floor(v)
+    a = np.float32(u - i)
+    b = np.float32(v - j)
+    i0 = int(i) & 511
+    j0 = int(j) & 511
+    i1 = (i0 + 1) & 511
+    j1 = (j0 + 1) & 511
     top = tile[i0, j0] * (1 - b) + tile[i0, j1] * b
     bottom = tile[i1, j0] * (1 - b) + tile[i1, j1] * b
     return top * (1 - a) + bottom * a
@@ -141,7 +145,8 @@ def sky_radiance(tile, x, y, z, light, out):
     cover = 0.0
     if clouds > 0.0 and z > 0.0:
         scale = 22.0 / (up + 0.12)
-        u, v = x * scale + 37.0 * phase, y * scale + 11.0 * phase
+        u = x * scale + 37.0 * phase
+        v = y * scale + 11.0 * phase
         n = 0.65 * texture(tile, u, v) + 0.35 * texture(tile, 3.1 * u, 3.1 * v)
         cover = min(max((n - 1.0 + clouds) / 0.35, 0.0), 1.0) * min(up * 12.0, 1.0)
     bright = (0.55 + 0.5 * sun_colour[1]) if sun_colour[1] > 0.5 else 0.85

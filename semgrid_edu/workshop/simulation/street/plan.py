@@ -118,7 +118,8 @@ def _side(style: str, lanes: int, lane: float, parking: bool, rng: np.random.Gen
     strip = rng.uniform(1.4, 2.6) if rng.random() < looks["grass"] else 0.0
     walk = rng.uniform(*looks["sidewalk"])
     if style == "park" and rng.random() < 0.4:
-        strip, walk = 0.0, 0.0
+        strip = 0.0
+        walk = 0.0
     rise = rng.uniform(*looks["bank"]) if "bank" in looks else 0.0
     return Side(edge, strip, walk, rise, rng.uniform(2.5, 6.0))
 

@@ -161,7 +161,8 @@ def _garden(builder: Builder, s0: float, s1: float, sign: int, offset: float, de
     """Plant the garden between border and house, and beside the house."""
     rng = builder.rng
     for _ in range(rng.integers(1, 4)):
-        s, d = rng.uniform(s0, s1), sign * (offset + rng.uniform(0.6, max(depth - 1.5, 0.8)))
+        s = rng.uniform(s0, s1)
+        d = sign * (offset + rng.uniform(0.6, max(depth - 1.5, 0.8)))
         (_bush if rng.random() < 0.6 else _tree)(builder, s, d)
     if rng.random() < 0.7:
         _tree(builder, s1 - 1.0, sign * (offset + depth + rng.uniform(2, 12)))
@@ -243,7 +244,8 @@ def _horizon(builder: Builder) -> None:
     rng = builder.rng
     plan = builder.plan
     for _ in range(70):
-        s, d = rng.uniform(plan.start, plan.end + 60), rng.choice([-1, 1]) * rng.uniform(38, 110)
+        s = rng.uniform(plan.start, plan.end + 60)
+        d = rng.choice([-1, 1]) * rng.uniform(38, 110)
         _tree(builder, s, d)
     for d in np.arange(-70, 70, 3.5):
         _tree(builder, plan.end - 8 + rng.uniform(-12, 10), d + rng.uniform(-1, 1))

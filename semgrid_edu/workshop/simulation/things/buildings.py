@@ -52,7 +52,8 @@ def _pick(palette: str, rng: np.random.Generator) -> tuple[float, float, float]:
 
 def _walls(house: House) -> list[tuple[NDArray, NDArray, float]]:
     """Return origin, direction and length of the four walls, each left to right as seen from outside; front first."""
-    w, d = house.width / 2, house.depth
+    w = house.width / 2
+    d = house.depth
     corners = np.array([[-w, 0, 0], [w, 0, 0], [w, d, 0], [-w, d, 0]])
     edges = np.roll(corners, -1, axis=0) - corners
     lengths = np.linalg.norm(edges, axis=1)
@@ -73,7 +74,8 @@ def _windows(origin, along, length: float, sills: NDArray, style: tuple, rng: np
     step = length / n
     x, z = (a.ravel() for a in np.meshgrid((np.arange(n) + 0.5) * step - w / 2, sills))
     keep = rng.random(len(x)) > 0.06
-    x, z = x[keep], z[keep]
+    x = x[keep]
+    z = z[keep]
     corner = origin + x[:, None] * along + z[:, None] * UP
     curtain = rng.random((len(x), 1))
     pane = np.where(curtain < 0.3, 0.25, 0.02) * np.array([1.0, 1.02, 1.06]) * (0.6 + 0.8 * curtain)
@@ -123,7 +125,9 @@ def _shop_front(origin, along, length: float, rng: np.random.Generator) -> list[
 def _gable(house: House, tiles, wall, wall_material, rng: np.random.Generator) -> list[Shape]:
     """Build a gable roof with overhanging eaves and a chimney; its ridge is along the street or across it."""
     across = rng.random() < 0.4
-    w, d, z = house.width / 2, house.depth, house.eaves
+    w = house.width / 2
+    d = house.depth
+    z = house.eaves
     span, run = (w, d / 2) if not across else (d / 2, w)
     rise = run * rng.uniform(0.6, 1.0)
     over = 0.45
@@ -161,7 +165,9 @@ def _hip(house: House, tiles) -> list[Shape]:
 
 def _flat(house: House, wall) -> list[Shape]:
     """Build a flat roof with a cornice."""
-    w, d, z = house.width, house.depth, house.eaves
+    w = house.width
+    d = house.depth
+    z = house.eaves
     cornice = 0.8 * np.asarray(wall) + 0.1
     return [
         _box((0, d / 2, z + 0.1), (w + 0.5, d + 0.5, 0.35), cornice, Material.PLASTER),

@@ -200,7 +200,8 @@ def _walking(phase: int) -> Shape:
     """Make a person of 1.78 m in mid-stride; colours are garment numbers."""
     kind = Kind.PEDESTRIAN
     swing = np.sin(2 * np.pi * phase / _PHASES)
-    hip, shoulder = np.array([0.0, 0.0, 0.95]), np.array([0.03, 0.0, 1.45])
+    hip = np.array([0.0, 0.0, 0.95])
+    shoulder = np.array([0.03, 0.0, 1.45])
     parts = _trunk(hip, shoulder, kind)
     for side in (-1, 1):
         step = side * swing
@@ -219,7 +220,8 @@ def _walking(phase: int) -> Shape:
 def _riding(phase: int) -> Shape:
     """Make a cyclist without the bicycle; colours are garment numbers."""
     kind = Kind.BICYCLE
-    hip, shoulder = np.array([-0.22, 0.0, 0.98]), np.array([0.1, 0.0, 1.48])
+    hip = np.array([-0.22, 0.0, 0.98])
+    shoulder = np.array([0.1, 0.0, 1.48])
     parts = _trunk(hip, shoulder, kind)
     for side in (-1, 1):
         turn = 2 * np.pi * phase / _PHASES + (np.pi if side > 0 else 0)
@@ -227,7 +229,8 @@ def _riding(phase: int) -> Shape:
         knee = (hip + foot) / 2 + np.array([0.2, 0.02 * side, 0.06])
         parts += _limb([np.add(hip, (0, 0.09 * side, 0)), knee, foot], (0.09, 0.065, 0.05), _TROUSERS, kind)
         parts.append(_blob(np.add(foot, (0.05, 0, -0.03)), (0.12, 0.045, 0.04), _SHOES, kind, 0))
-        elbow, hand = np.array([0.22, 0.26 * side, 1.2]), np.array([0.4, 0.25 * side, 1.04])
+        elbow = np.array([0.22, 0.26 * side, 1.2])
+        hand = np.array([0.4, 0.25 * side, 1.04])
         parts += _limb([np.add(shoulder, (0, 0.18 * side, -0.03)), elbow, hand], (0.055, 0.045, 0.035), _TOP, kind)
     return merge(parts)
 

@@ -144,7 +144,8 @@ def rotation_matrix(roll: float, pitch: float, yaw: float) -> NDArray[np.float64
         Angles about the x, y and z axes, rad.
     """
     cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
-    ahead, left = (cy * cp, sy * cp, -sp), (cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr)
+    ahead = (cy * cp, sy * cp, -sp)
+    left = (cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr)
     return np.column_stack([ahead, left, (cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr)])
 
 
@@ -215,7 +216,8 @@ def tube(
     sides : int
         Number of faces around the axis.
     """
-    start, end = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    start = np.asarray(start, dtype=np.float64)
+    end = np.asarray(end, dtype=np.float64)
     first, last = radii if isinstance(radii, tuple) else (radii, radii)
     vertices, faces = _primitive("cylinder", radius=1.0, height=1.0, sections=sides)
     axis = (end - start) / np.linalg.norm(end - start)
