@@ -51,13 +51,13 @@ from ipywidgets import FloatSlider, interact
 
 # %% jupyter={"source_hidden": true}
 from semgrid_edu import plotting
-from semgrid_edu.crf import expected_calibration_error, reliability
 from semgrid_edu.datasets.samples import real_drive, sample_drive, sample_weights
 from semgrid_edu.fast import load_net
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, draw, eliminate
 from semgrid_edu.labels import IGNORE, KITTI_14
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.workshop.course import street
+from semgrid_edu.workshop.scoring.calibration import expected_calibration_error, reliability
 from semgrid_edu.workshop.scoring.statistics import paired_interval
 from worlds import lecture_13_checks as checks
 from worlds import lecture_13_report_card as card

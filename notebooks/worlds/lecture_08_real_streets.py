@@ -13,7 +13,6 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.datasets.index import DatasetIndex, LabelledFrame
 from semgrid_edu.datasets.pandaset import CAMERAS, PandasetScene
 from semgrid_edu.datasets.samples import sample_weights
@@ -27,7 +26,8 @@ from semgrid_edu.storage.files import check_writable, sha256, table_beside, writ
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.training import TrainingParams, train
 from semgrid_edu.training.devices import open_fabric
-from semgrid_edu.workshop.scoring.confusions import FrameConfusions, GridCounts, count_grids, reliability_of_sums
+from semgrid_edu.workshop.scoring.calibration import expected_calibration_error, reliability_of_sums
+from semgrid_edu.workshop.scoring.confusions import FrameConfusions, GridCounts, count_grids
 from semgrid_edu.workshop.scoring.grids import NETWORK, crf_refinement, majority_by_state, network_grids
 from semgrid_edu.workshop.scoring.score_with_interval import (
     compared,

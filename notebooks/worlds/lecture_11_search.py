@@ -12,11 +12,14 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+from scipy.special import log_softmax
 from scipy.stats import qmc
 from tqdm.auto import tqdm
 
-from semgrid_edu.crf import CrfParams, at_temperature, fit_temperature
+from semgrid_edu.crf import CrfParams
 from semgrid_edu.fast import TrainingSet, mean_field
+from semgrid_edu.labels import IGNORE
 from semgrid_edu.metrics import class_accuracy, confusion_matrix, pixel_accuracy
 from semgrid_edu.networks import load_net
 from semgrid_edu.workshop.scoring.grids import learned_log_g
@@ -73,6 +76,26 @@ def next_point(points: list[NDArray], values: list[NDArray], seed: int) -> NDArr
     return np.clip(points[objective.argmax()] + step, 0, 1)
 
 
+def fit_temperature(log_p: NDArray, truth: NDArray) -> float:
+    """Return the temperature T that makes the truth most likely, "temperature scaling" (Guo et al. 2017).
+
+    Parameters
+    ----------
+    log_p : (C, ...) float
+        Natural logarithms of the classes' probabilities; those of log p / T are compared with the truth.
+    truth : (...) int
+        The class of each cell; 255 where unlabelled.
+    """
+    labelled = truth != IGNORE
+    log_p, classes = log_p[:, labelled].astype(np.float64), truth[labelled].astype(np.int64)
+
+    def loss(log_T: float) -> float:
+        scaled = log_softmax(log_p / np.exp(log_T), axis=0)
+        return -np.take_along_axis(scaled, classes[None], axis=0).mean()
+
+    return float(np.exp(minimize_scalar(loss, bounds=(np.log(0.01), np.log(100)), method="bounded").x))
+
+
 def main(data: Path, weights: Path, trials: int = 120, seed: int = 0) -> None:
     """Calibrate the network, try parameters, and print those that are best for each metric.
 
@@ -93,7 +116,7 @@ def main(data: Path, weights: Path, trials: int = 120, seed: int = 0) -> None:
     truth = frames.arrays["truth"]
     log_g = np.stack([learned_log_g(net, frames[k]) for k in range(len(frames))], axis=1)  # (C, N, H, W)
     temperature = fit_temperature(log_g, truth)
-    log_g = at_temperature(log_g, temperature)
+    log_g = log_softmax(log_g / temperature, axis=0)
     points = []
     values = []
     for _ in tqdm(range(trials), unit="trial"):

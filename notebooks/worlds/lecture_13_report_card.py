@@ -7,12 +7,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from semgrid_edu.crf import expected_calibration_error, reliability
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.frames import FrameSequence
 from semgrid_edu.frame import Frame
 from semgrid_edu.metrics import METRICS
 from semgrid_edu.workshop.course.street import motion_between, piece_confusions
+from semgrid_edu.workshop.scoring.calibration import expected_calibration_error, reliability
 from semgrid_edu.workshop.scoring.statistics import drive_interval, paired_interval
 from worlds import lecture_13_checks as checks
 from worlds.lecture_13_faults import YAWS, image_mirrored

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import IGNORE, KITTI_14
@@ -14,12 +13,16 @@ from semgrid_edu.metrics import METRICS, confusion_matrix
 from semgrid_edu.occupancy import PlanarMotion
 from semgrid_edu.occupancy.planar_motion import look_up
 from semgrid_edu.workshop.course.street import cells_seen, frames_since_seen
+from semgrid_edu.workshop.scoring.calibration import (
+    expected_calibration_error,
+    reliability,
+    reliability_of_sums,
+    reliability_sums,
+)
 from semgrid_edu.workshop.scoring.confusions import (
     BANDS,
     band_names,
     distance_bands,
-    reliability_of_sums,
-    reliability_sums,
 )
 from semgrid_edu.workshop.scoring.score_with_interval import (
     compared,
@@ -114,7 +117,7 @@ def count_cells(probability: NDArray, truth: NDArray) -> CellCounts:
     confusion, forbidden = (confusion_matrix(truth, of.argmax(axis=0), n) for of in (probability, semantic))
     if not len(truth):
         return CellCounts(confusion, forbidden, np.zeros((3, 15)), 0.0)
-    sums = reliability_sums(probability, truth)
+    sums = reliability_sums(reliability(probability, truth))
     return CellCounts(confusion, forbidden, sums, float(np.square(probability - np.eye(n)[:, truth]).sum()))
 
 

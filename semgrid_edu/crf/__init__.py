@@ -11,28 +11,17 @@ from semgrid_edu.crf.naive import (
     pair_weights,
 )
 from semgrid_edu.crf.params import CrfParams, unary_from_probability
-from semgrid_edu.crf.temperature import (
-    Reliability,
-    at_temperature,
-    expected_calibration_error,
-    fit_temperature,
-    reliability,
-)
 
 __all__ = [
     "CrfParams",
     "PermutohedralLattice",
-    "Reliability",
     "SeparableGaussian",
-    "at_temperature",
     "bilateral_kernel",
     "crf_model",
     "damping",
     "enclosing_simplices",
     "energy",
     "exact_marginals",
-    "expected_calibration_error",
-    "fit_temperature",
     "free_energy",
     "gram_matrix",
     "log_partition",
@@ -42,6 +31,5 @@ __all__ = [
     "mean_field_updates",
     "most_likely",
     "pair_weights",
-    "reliability",
     "unary_from_probability",
 ]

@@ -8,7 +8,7 @@ import pytest
 from sklearn.metrics import confusion_matrix
 
 from semgrid_edu.camera import project, transform_points
-from semgrid_edu.crf import CrfParams, expected_calibration_error
+from semgrid_edu.crf import CrfParams
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
@@ -22,6 +22,7 @@ from semgrid_edu.workshop.paper.score_runs import (
     CountingRun,
 )
 from semgrid_edu.workshop.paper.variants import EXACT, CalibrationError
+from semgrid_edu.workshop.scoring.calibration import expected_calibration_error
 from semgrid_edu.workshop.scoring.confusions import (
     BANDS,
     count_grids,

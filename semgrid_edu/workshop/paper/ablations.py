@@ -6,7 +6,6 @@ from itertools import chain
 
 import numpy as np
 
-from semgrid_edu.crf import expected_calibration_error
 from semgrid_edu.labels import KITTI_14
 from semgrid_edu.metrics import pixel_accuracy
 from semgrid_edu.storage.files import table_beside
@@ -18,6 +17,7 @@ from semgrid_edu.workshop.paper.score_runs import WITH_CRF, WITH_SEARCHED, Score
 from semgrid_edu.workshop.paper.tables import CELLS, beside_usual, beside_usual_table
 from semgrid_edu.workshop.paper.truth_costs import learned_from
 from semgrid_edu.workshop.paper.variants import CalibrationError, named_variants
+from semgrid_edu.workshop.scoring.calibration import expected_calibration_error
 from semgrid_edu.workshop.scoring.confusions import distance_band_names
 from semgrid_edu.workshop.scoring.grids import NETWORK
 from semgrid_edu.workshop.scoring.score_with_interval import markdown_table, on_cells, score_with_interval, shown

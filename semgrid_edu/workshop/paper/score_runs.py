@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import log_softmax
 
-from semgrid_edu.crf import CrfParams, at_temperature
-from semgrid_edu.crf.temperature import Reliability
+from semgrid_edu.crf import CrfParams
 from semgrid_edu.datasets.index import load_index
 from semgrid_edu.datasets.kitti_raw import KittiRawDrive
 from semgrid_edu.datasets.project_lidar import depth_scan, seen_returns
@@ -24,13 +24,13 @@ from semgrid_edu.workshop.paper.run import Run
 from semgrid_edu.workshop.paper.run_counts import RunCounts
 from semgrid_edu.workshop.paper.training_runs import NetworkRun
 from semgrid_edu.workshop.paper.variants import EXACT, CalibrationError
+from semgrid_edu.workshop.scoring.calibration import Reliability, reliability_of_sums
 from semgrid_edu.workshop.scoring.confusions import (
     FrameConfusions,
     Grids,
     count_grids,
     load_confusions,
     reliability_key,
-    reliability_of_sums,
     save_confusions,
     seed_confusions,
 )
@@ -223,7 +223,7 @@ class ScoreRun(CountingRun, NetworkRun):
 
 def _refined(temperature: float, params: CrfParams, log_g: NDArray, o: NDArray) -> NDArray:
     """Refine a grid by the CRF, after its log-probabilities were divided by a temperature."""
-    return mean_field(-at_temperature(log_g, temperature), o, params)
+    return mean_field(-log_softmax(log_g / temperature, axis=0), o, params)
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm.auto import tqdm
 
-from semgrid_edu.crf.temperature import Reliability, reliability
 from semgrid_edu.datasets.training_set import TrainingSet
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.metrics import confusion_matrix
 from semgrid_edu.storage.tensors import read_arrays, write_arrays
+from semgrid_edu.workshop.scoring.calibration import reliability, reliability_sums
 
 DRIVES = "drives"
 """Key of the drives in a file of confusion matrices; reserved, so no method may use it."""
@@ -253,31 +253,6 @@ def reliability_key(method: str, truth: str) -> str:
     return method if truth == "true" else f"{method}, {truth} labels"
 
 
-def reliability_sums(probability: NDArray, truth: NDArray) -> NDArray[np.float64]:
-    """Return the number of cells, the sum of their confidences and the number of correct cells per bin, (3, B).
-
-    Parameters
-    ----------
-    probability, truth : array
-        As for `reliability`.
-    """
-    diagram = reliability(probability, truth)
-    return np.stack([diagram.cells, diagram.confidence * diagram.cells, diagram.accuracy * diagram.cells])
-
-
-def reliability_of_sums(sums: NDArray) -> Reliability:
-    """Return a method's accuracy as a function of its confidence.
-
-    Parameters
-    ----------
-    sums : (3, B) float
-        From `GridCounts.reliability`, or the sum of several.
-    """
-    cells, confidence, right = sums
-    divisor = np.maximum(cells, 1)  # an empty bin has weight 0
-    return Reliability(confidence / divisor, right / divisor, cells.astype(np.int64))
-
-
 def count_grids(grids: Grids, frames: TrainingSet) -> GridCounts:
     """Compare the grids of one or several methods with the truth, per frame.
 
@@ -303,7 +278,7 @@ def count_grids(grids: Grids, frames: TrainingSet) -> GridCounts:
             if np.ndim(grid) == 3:
                 for truth, classes in truths.items():
                     key = reliability_key(method, truth)
-                    confidence[key] = confidence.get(key, 0) + reliability_sums(grid, classes[k])
+                    confidence[key] = confidence.get(key, 0) + reliability_sums(reliability(grid, classes[k]))
                 grid = grid.argmax(axis=0)
             for truth, classes in truths.items():
                 for name, matrix in _by_band(classes[k], grid, band, len(frames.label_set)).items():
