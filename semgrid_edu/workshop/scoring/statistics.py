@@ -1,7 +1,6 @@
 """Confidence intervals for scores and score differences, over drives and seeds (section 4.2)."""
 
 from collections.abc import Callable
-from hashlib import sha256
 from typing import NamedTuple
 
 import numpy as np
@@ -203,26 +202,14 @@ def _checked(name: str, confusions: ArrayLike) -> NDArray:
     return matrices
 
 
-_KNOWN: dict[tuple, tuple[NDArray, NDArray]] = {}
-"""What `_jackknife` has returned, by its arguments: a table compares many methods with the same one."""
-
-
 def _left_out(confusions: NDArray, metric: Metric) -> tuple[NDArray, NDArray]:
-    """Return each seed's metric on all drives (S,), and with each drive left out (S, V)."""
-    key = metric, sha256(np.ascontiguousarray(confusions)).digest(), confusions.dtype.str, confusions.shape
-    if key not in _KNOWN:
-        _KNOWN[key] = _jackknife(confusions, metric)
-    scores, without = _KNOWN[key]
+    """Return each seed's metric on all drives (S,), and with each drive left out (S, V): a jackknife over drives."""
+    totals = confusions.sum(axis=1)
+    scores = np.array([metric(total) for total in totals])
+    without = np.array([[metric(matrix) for matrix in matrices] for matrices in totals[:, None] - confusions])
     if not (np.isfinite(scores).all() and np.isfinite(without).all()):
         raise ArgumentError("metric", "a finite number for all drives, and for all but one of them", "NaN or infinity")
     return scores, without
-
-
-def _jackknife(confusions: NDArray, metric: Metric) -> tuple[NDArray, NDArray]:
-    """Compute what `_left_out` returns."""
-    totals = confusions.sum(axis=1)
-    scores = np.array([metric(total) for total in totals])
-    return scores, np.array([[metric(matrix) for matrix in matrices] for matrices in totals[:, None] - confusions])
 
 
 def _estimate(scores: NDArray, without: NDArray) -> EstimatedMean:
