@@ -45,6 +45,8 @@ CARD = f"{DEMO} --weights weights.safetensors"
 UNPREPARED = "--cache OTHER train --data TINY"
 IN_FILE = "reproduce table1 --runs RUNS --out architecture.json --plan"
 
+LOST = "expected a new file, or an earlier result of this command, found something else, which would be lost"
+
 Spoil = Callable[[Path], object]
 
 
@@ -335,17 +337,16 @@ WEIGHTS = (
 )
 
 RUNS = (
-    Row(
-        "a folder that holds a network",
+    *rows(
         f"{UNPREPARED} --out OUT",
-        "OUT: expected a folder without a trained",
-        text("OUT/weights.safetensors", "x"),
+        "",
+        ("a folder that holds a network", "OUT: .* without a trained network", text("OUT/weights.safetensors", "x")),
+        ("a folder that holds a checkpoint", "OUT: .* an interrupted run", text("OUT/checkpoint.safetensors", "x")),
+        ("an image stage of one's own", f"image_stage.safetensors: {LOST}", text("OUT/image_stage.safetensors", "x")),
+        ("a log of one's own", f"log.csv: {LOST}", text("OUT/log.csv", "day,hours")),
     ),
     Row(
-        "a folder that holds a checkpoint",
-        TRAIN,
-        "OUT: expected .* interrupted run",
-        text("OUT/checkpoint.safetensors", "x"),
+        "a folder that another process writes to", TRAIN, "OUT: expected a folder that no other process", locked("OUT")
     ),
     Row("too few frames for a batch", TRAIN, "--data: expected at least one batch of 6", frames()),
     *rows(
@@ -359,12 +360,6 @@ RUNS = (
         "a training run over other results",
         TRAIN.replace("OUT", "SAMPLES/one"),
         "found the provenance.json of something",
-    ),
-    Row(
-        "a folder that another process writes to",
-        TRAIN,
-        "OUT: expected a folder that no other process writes to",
-        locked("OUT"),
     ),
     Row("a name that isn't UTF-8", "train --data TINY --out \udcff", "--out: expected UTF-8"),
     Row("a link to itself", "curves loop --out c.png", "[Ll]oop", lambda r: (r / "loop").symlink_to(r / "loop")),
@@ -409,11 +404,7 @@ DATA = (
         ("a folder with other files", ": expected an empty folder", text("OUT/sample/thesis.txt", "x")),
     ),
     Row("no workers", "data make sample OUT --workers 0", "--workers: expected at least one process"),
-    Row(
-        "1000 workers",
-        "data make sample OUT --workers 1000",
-        r"--workers: expected .* \d+ cores can be used here, found 1000",
-    ),
+    Row("1000 workers", "data make sample OUT --workers 1000", r"--workers: expected .* \d+ cores .* found 1000"),
     Row(
         "a data set of another seed",
         "data make sample OUT",
@@ -481,18 +472,12 @@ EXPERIMENTS = (
     Row("a scene that isn't there", "data index OUT --pandaset TINY --scene 002", "TINY/002"),
     Row(
         "a network of another kind to start from",
-        "train --data TINY --out OUT --from fresh.safetensors --segmenter fcn",
+        f"{TRAIN} --from fresh.safetensors --segmenter fcn",
         "fresh.safetensors: expected a network like the one to train",
     ),
-    Row(
-        "no network to start from",
-        "train --data TINY --out OUT --from none.safetensors",
-        "none.safetensors: expected a safetensors file, found no such file",
-    ),
-    Row(
-        "half a size", "train --data TINY --out OUT --image-size 640", "--image-size: expected height x width in pixels"
-    ),
-    Row("a tint that can't be", "train --data TINY --out OUT --tint -1", "--tint: expected a share from 0 to 1"),
+    Row("no network to start from", f"{TRAIN} --from none", "none: expected a safetensors file, found no such file"),
+    Row("half a size", f"{TRAIN} --image-size 640", "--image-size: expected height x width in pixels"),
+    Row("a tint that can't be", f"{TRAIN} --tint -1", "--tint: expected a share from 0 to 1"),
     Row("no results to check", "reproduce check TINY", "TINY: expected results such as table1.json, found none"),
     Row("no folder of results", "reproduce check NONE", "NONE: expected results such as table1.json, found none"),
     *rows(
@@ -559,8 +544,6 @@ IN_PLACE = "architecture.json: expected a folder, found the file"
 PAPERS = ("table1", "all")
 """Of the paper's experiments, which are one command, the first and all."""
 
-LOST = "expected a new file, or an earlier result of this command, found something else, which would be lost"
-
 
 def of_paper(name: str) -> tuple[Row, ...]:
     """What an experiment of the paper refuses before the first run starts."""
@@ -612,19 +595,8 @@ REFUSED_FIRST = (
     Row("matrices in a folder", f"{EVALUATE} --confusions a.npz", "a.npz: .*found a folder", folder("a.npz")),
     Row("curves over one's own picture", "curves RUN --out c.png", f"{LOST} without --force", text("c.png", "x")),
     Row("curves over a pipe", "curves RUN --out c.png", "c.png: .*found a pipe", pipe("c.png")),
-    Row("a log of one's own", f"{UNPREPARED} --out OUT", f"log.csv: {LOST}", text("OUT/log.csv", "day,hours")),
-    Row(
-        "an image stage of one's own",
-        f"{UNPREPARED} --out OUT",
-        f"image_stage.safetensors: {LOST}",
-        text("OUT/image_stage.safetensors", "x"),
-    ),
     Row("a log of one's own, resumed", f"{TRAIN} --resume", f"log.csv: {LOST}", text("OUT/log.csv", "day,hours")),
-    Row(
-        "no ImageNet weights",
-        f"{TRAIN} --preset paper --imagenet a.safetensors",
-        "a.safetensors: expected a safetensors",
-    ),
+    Row("no ImageNet weights", f"{TRAIN} --preset paper --imagenet none", "none: expected a safetensors file"),
     Row(
         "ImageNet weights for a compact network", f"{TRAIN} --imagenet fresh.safetensors", "fresh.safetensors: expected"
     ),

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import typer
 from bad_inputs import HELD, HUGE, TABLE, log, sample
-from tiny_drive import DATE, write_tiny_drive
+from tiny_drive import DATE, write_tiny_dataset
 
 import semgrid_edu.workshop.scoring.evaluate
 import semgrid_edu.workshop.training_run
@@ -35,20 +35,11 @@ def in_this_process():
         yield
 
 
-def write_dataset(root: Path) -> None:
-    """Six drives to learn from, one to test, one for validation; three frames each, the last one labelled."""
-    frames = [{"date": DATE, "drive": f"{k:04d}", "frame": 2} for k in range(1, 9)]
-    for frame in frames:
-        write_tiny_drive(root, frame["drive"])
-    splits = {"train": frames[:6], "test": frames[6:7], "validation": frames[7:]}
-    (root / "dataset.json").write_text(json.dumps({"name": "tiny", "label_set": "KITTI-14", "splits": splits}))
-
-
 @pytest.fixture(scope="module")
 def prepared(tmp_path_factory) -> Iterator[Path]:
     """What every row of the table finds, and none changes."""
     root = tmp_path_factory.mktemp("prepared")
-    write_dataset(root / "TINY")
+    write_tiny_dataset(root / "TINY", train=6, test=1, validation=1)
     for split in ("train", "test", "validation"):
         TrainingSet(root / "TINY", split)
     net = build_net(Architecture(), KittiRawDrive(root / "TINY", DATE, "0001").camera)

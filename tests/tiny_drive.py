@@ -39,13 +39,18 @@ def write_tiny_drive(root: Path, drive: str = "0001", n_frames: int = 3, labelle
     return folder
 
 
-def write_tiny_dataset(root: Path) -> Path:
-    """Write a data set of two drives to learn from and one to test, three frames each, the last labelled."""
-    for drive in ("0001", "0002", "0003"):
-        write_tiny_drive(root, drive)
-    frame = {"date": DATE, "frame": 2}
-    splits = {"train": [{**frame, "drive": "0001"}, {**frame, "drive": "0002"}], "test": [{**frame, "drive": "0003"}]}
-    (root / "dataset.json").write_text(json.dumps({"name": "tiny", "label_set": "KITTI-14", "splits": splits}))
+def write_tiny_dataset(root: Path, n_frames: int = 3, name: str = "tiny", **n_drives: int) -> Path:
+    """Write a data set of so many drives in each split, by default two to learn from and one to test.
+
+    The last frame of each drive is labelled.
+    """
+    splits, last = {}, n_frames - 1
+    for split, number in (n_drives or {"train": 2, "test": 1}).items():
+        first = 1 + sum(map(len, splits.values()))
+        splits[split] = [{"date": DATE, "drive": f"{first + k:04d}", "frame": last} for k in range(number)]
+        for frame in splits[split]:
+            write_tiny_drive(root, frame["drive"], n_frames, (last,))
+    (root / "dataset.json").write_text(json.dumps({"name": name, "label_set": "KITTI-14", "splits": splits}))
     return root
 
 

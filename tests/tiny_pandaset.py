@@ -52,7 +52,7 @@ _CLASSES = {
 _FAKES = {name: _named(module, name) for module, names in _CLASSES.items() for name in names}
 
 
-class _Called:
+class Called:
     """Pickled as the call of a function."""
 
     def __init__(self, function, *args):
@@ -72,9 +72,9 @@ def pickled_table(columns, protocol=3):
         {"values": np.array([values[place] for place in places]), "mgr_locs": np.array(places)}
         for places in kinds.values()
     ]
-    names = _Called(_FAKES["_new_Index"], _FAKES["Index"], {"data": np.array(list(columns), object), "name": None})
+    names = Called(_FAKES["_new_Index"], _FAKES["Index"], {"data": np.array(list(columns), object), "name": None})
     rows = {"name": None, "start": 0, "stop": max(map(len, values)), "step": 1}
-    axes = [names, _Called(_FAKES["_new_Index"], _FAKES["RangeIndex"], rows)]
+    axes = [names, Called(_FAKES["_new_Index"], _FAKES["RangeIndex"], rows)]
     manager = _FAKES["BlockManager"](([], [], [], {"0.14.1": {"axes": axes, "blocks": blocks}}))
     modules = {module: ModuleType(module) for module in (*_CLASSES, "pandas", "pandas.core", "pandas.core.internals")}
     for module, classes in _CLASSES.items():

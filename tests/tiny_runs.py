@@ -1,10 +1,10 @@
 """Training runs of seconds on hand-made data, which processes import."""
 
-import json
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from tiny_drive import DATE, write_tiny_drive
+from tiny_drive import write_tiny_dataset
 
 from semgrid_edu.workshop.paper import data_runs
 from semgrid_edu.workshop.paper.data_runs import ArraysRun, DataRun
@@ -24,13 +24,8 @@ class HandMadeData(DataRun):
     data: str = "tiny"
 
     def work(self, root: Path, device: str) -> None:
-        folder, splits = self.dataset_dir(root), {}
-        folder.mkdir(exist_ok=True)
-        for k, route in enumerate(data_runs.RECIPE_OF[self.data].routes, start=1):
-            write_tiny_drive(folder, f"{k:04d}", n_frames=2, labelled=(1,))
-            splits.setdefault(route.split, []).append({"date": DATE, "drive": f"{k:04d}", "frame": 1})
-        index = {"name": self.data, "label_set": "KITTI-14", "splits": splits}
-        (folder / "dataset.json").write_text(json.dumps(index))
+        n_drives = Counter(route.split for route in data_runs.RECIPE_OF[self.data].routes)
+        write_tiny_dataset(self.dataset_dir(root), n_frames=2, name=self.data, **n_drives)
 
 
 def tiny_training_runs(iterations: int = 2) -> list[GridStageRun]:

@@ -75,8 +75,6 @@ def test_table_1_compares_it_with_the_papers_networks(tmp_path):
 
 
 def test_what_is_not_registered_is_refused_before_anything_runs(tmp_path):
-    with pytest.raises(
-        ArgumentError, match=r"--scale: expected after a plus one of segnet, .*, one-layer, found 'vit'"
-    ):
+    with pytest.raises(ArgumentError, match=r"--scale: expected after a plus one of .*, one-layer, found 'vit'"):
         reports.reproduce(table1("quick+vit", tmp_path), print)
     assert scale_named("tiny+one-layer+segnet").networks == ("segnet", "one-layer")

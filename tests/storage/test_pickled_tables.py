@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 from pandas import DataFrame
-from tiny_pandaset import pickled_table
+from tiny_pandaset import Called, pickled_table
 
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage import pickled_tables
@@ -57,22 +57,12 @@ def test_reads_the_form_of_pandas_1(tmp_path, protocol):
         assert table[name].tolist() == list(values)
 
 
-class Call:
-    """Pickled as the call of a function."""
-
-    def __init__(self, function, *args):
-        self.call = function, args
-
-    def __reduce__(self):
-        return self.call
-
-
 HOSTILE = {
-    "os.system": (Call(os.system, "echo run > harm"), r"names \w+\.system"),
-    "builtins.eval": (Call(eval, "open('harm', 'w')"), r"names builtins\.eval"),
-    "a call inside a table": ({"_data": [Call(os.mkdir, "harm")]}, r"names \w+\.mkdir"),
-    "a call of what a call returns": (Call(os.system, Call(eval, "'echo run > harm'")), r"names \w+\.system"),
-    "numpy's loader": (Call(np.load, "harm"), r"names numpy\.load"),
+    "os.system": (Called(os.system, "echo run > harm"), r"names \w+\.system"),
+    "builtins.eval": (Called(eval, "open('harm', 'w')"), r"names builtins\.eval"),
+    "a call inside a table": ({"_data": [Called(os.mkdir, "harm")]}, r"names \w+\.mkdir"),
+    "a call of what a call returns": (Called(os.system, Called(eval, "'echo run > harm'")), r"names \w+\.system"),
+    "numpy's loader": (Called(np.load, "harm"), r"names numpy\.load"),
     "text": ("a table?", "str in place of DataFrame"),
 }
 

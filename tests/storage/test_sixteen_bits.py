@@ -28,13 +28,6 @@ def test_reads_what_opencv_writes(path, picture):
     np.testing.assert_array_equal(read_png(path, "RGB;16", picture.shape[:2]), picture)
 
 
-@pytest.mark.parametrize(("first", "last"), [(0, 65535), (255, 256), (32767, 32768)])
-def test_every_bit_counts(tmp_path, first, last):
-    expected = np.array([[[first, last, 0x1234]] * 3, [[last, first, 0xABCD]] * 3], np.uint16)
-    cv2.imwrite(str(tmp_path / "a.png"), expected[..., ::-1])
-    np.testing.assert_array_equal(read_png(tmp_path / "a.png", "RGB;16", (2, 3)), expected)
-
-
 @pytest.mark.parametrize(
     ("damage", "message"),
     [

@@ -59,9 +59,7 @@ def test_going_on_from_a_damaged_log_is_refused(path, damage):
 def test_a_wrong_line_is_named(path, line):
     with path.open("a") as log:
         log.write(f"{line}\n")
-    with pytest.raises(
-        DataError, match=rf"log.csv: expected iteration,stage,learning_rate,loss in line 5, found '{line}'"
-    ):
+    with pytest.raises(DataError, match=rf"log.csv: expected iteration,.*,loss in line 5, found '{line}'"):
         read_log(path)
 
 
