@@ -14,8 +14,7 @@ from semgrid_edu.metrics import pixel_accuracy
 from semgrid_edu.storage.files import write_json
 from semgrid_edu.storage.provenance import made_by
 from semgrid_edu.workshop.paper.data_runs import frame_counts
-from semgrid_edu.workshop.paper.loop import execute_plan
-from semgrid_edu.workshop.paper.run import with_needs
+from semgrid_edu.workshop.paper.run import execute_plan, with_needs
 from semgrid_edu.workshop.paper.run_counts import RunCounts
 from semgrid_edu.workshop.paper.scales import SCALES, Scale
 from semgrid_edu.workshop.paper.score_runs import ScoreRun, by_seed

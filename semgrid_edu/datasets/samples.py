@@ -48,7 +48,7 @@ def trained_segmenters() -> list[str]:
     """Return the names in `SEGMENTERS` for which a trained compact network is shipped."""
     from semgrid_edu.networks import SEGMENTERS
 
-    return [name for name in SEGMENTERS if _trained_folder(name).is_dir()]
+    return [name for name in SEGMENTERS if (samples_dir() / f"{name}_compact").is_dir()]
 
 
 def sample_weights(segmenter: str = "segnet") -> Path:
@@ -81,11 +81,6 @@ def _trained(segmenter: str) -> Path:
     """Return the folder of a trained compact network, or raise an error when there is none."""
     if segmenter not in (trained := trained_segmenters()):
         raise ArgumentError("segmenter", f"one of {', '.join(trained)}", repr(segmenter))
-    return _trained_folder(segmenter)
-
-
-def _trained_folder(segmenter: str) -> Path:
-    """Return the folder for the trained compact network with this image network; it may be missing."""
     return samples_dir() / f"{segmenter}_compact"
 
 

@@ -1,7 +1,6 @@
 """Charts: confusion matrix (Table 3) and training loss (section 4.1)."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -10,9 +9,6 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from semgrid_edu.errors import ArgumentError
-
-if TYPE_CHECKING:  # training loads torch
-    from semgrid_edu.training.log import TrainingLog
 
 SMOOTHING = 50
 """Window of the running mean, steps; a shorter stage uses all its steps."""
@@ -52,7 +48,7 @@ def confusion(matrix: NDArray, names: Sequence[str], ax: Axes | None = None) -> 
     return ax
 
 
-def training_curves(logs: "Mapping[str, TrainingLog]") -> Axes:
+def training_curves(logs: Mapping[str, np.recarray]) -> Axes:
     """Draw the loss of training runs over steps: one point per step, and a line for the running mean.
 
     The losses of the two stages aren't comparable, one is over pixels and one over cells, so the line breaks between
@@ -60,7 +56,7 @@ def training_curves(logs: "Mapping[str, TrainingLog]") -> Axes:
 
     Parameters
     ----------
-    logs : mapping of str to TrainingLog
+    logs : mapping of str to recarray
         Logs from `read_log`, by their names in the legend.
 
     Raises
@@ -88,7 +84,7 @@ def training_curves(logs: "Mapping[str, TrainingLog]") -> Axes:
     return ax
 
 
-def _curve(ax: Axes, log: "TrainingLog", name: str, colour: str) -> None:
+def _curve(ax: Axes, log: np.recarray, name: str, colour: str) -> None:
     """Draw one training run by stage, with a dotted line at the start of each stage."""
     ax.scatter(log.iteration, log.loss, s=3, color=colour, alpha=0.2, linewidth=0)
     for stage, begin in _stages(log):
@@ -98,6 +94,6 @@ def _curve(ax: Axes, log: "TrainingLog", name: str, colour: str) -> None:
         ax.axvline(begin, color="0.5", linewidth=0.8, linestyle=":")
 
 
-def _stages(log: "TrainingLog") -> list[tuple[str, int]]:
+def _stages(log: np.recarray) -> list[tuple[str, int]]:
     """Return the stages of a training run and the first step of each."""
     return [(stage, log.iteration[log.stage == stage][0]) for stage in dict.fromkeys(log.stage.tolist())]

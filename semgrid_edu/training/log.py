@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from semgrid_edu.errors import DataError
 from semgrid_edu.storage.files import found_at, named_errors, write_text
@@ -37,26 +36,8 @@ class Step(NamedTuple):
 HEADER = ",".join(Step._fields) + "\n"
 """The first line of a log: the names of its columns."""
 
-
-class TrainingLog(NamedTuple):
-    """All steps of a training run: one array per column of the log.
-
-    Parameters
-    ----------
-    iteration : (N,) int
-        Number of each step, from 0.
-    stage : (N,) str
-        "image" or "grid".
-    learning_rate : (N,) float
-        The learning rate of each step.
-    loss : (N,) float
-        Weighted cross-entropy of the batch before each step, nats.
-    """
-
-    iteration: NDArray[np.int64]
-    stage: NDArray[np.str_]
-    learning_rate: NDArray[np.float64]
-    loss: NDArray[np.float64]
+COLUMNS = np.dtype({"names": Step._fields, "formats": (np.int64, "U5", np.float64, np.float64)})
+"""The types of these columns."""
 
 
 def begin_log(path: Path, start: int) -> None:
@@ -102,7 +83,7 @@ def append_step(path: Path, step: Step) -> None:
         log.write(f"{step.iteration},{step.stage},{step.learning_rate:.6g},{step.loss:.6g}\n")
 
 
-def read_log(path: str | Path) -> TrainingLog:
+def read_log(path: str | Path) -> np.recarray:
     """Read the log of a training run, finished or not.
 
     Parameters
@@ -112,16 +93,13 @@ def read_log(path: str | Path) -> TrainingLog:
 
     Returns
     -------
-    TrainingLog
-        N steps.
+    (N,) recarray
+        The steps; each field of `Step` is an attribute, (N,).
     """
     path = Path(path)
     if not path.is_file():
         raise DataError(path, "the log of a training run", found_at(path))
-    steps = _steps(path, _lines(path))
-    columns = zip(*steps, strict=True) if steps else [()] * len(Step._fields)
-    types = (np.int64, np.str_, np.float64, np.float64)
-    return TrainingLog(*(np.array(column, kind) for column, kind in zip(columns, types, strict=True)))
+    return np.array(_steps(path, _lines(path)), COLUMNS).view(np.recarray)
 
 
 def _lines(path: Path) -> list[str]:

@@ -17,9 +17,8 @@ from tiny_runs import results, tiny_training_runs
 from semgrid_edu.errors import DataError
 from semgrid_edu.networks import WEIGHTS
 from semgrid_edu.workshop.paper.experiments import EXPERIMENTS
-from semgrid_edu.workshop.paper.loop import claim_folder, execute_plan, run_one
 from semgrid_edu.workshop.paper.reproduce import Request, plan_table, reproduce
-from semgrid_edu.workshop.paper.run import estimate, left_to_do, with_needs
+from semgrid_edu.workshop.paper.run import claim_folder, estimate, execute_plan, left_to_do, run_one, with_needs
 from semgrid_edu.workshop.paper.scales import SCALES
 from semgrid_edu.workshop.workplace import Workplace, workplace
 
@@ -153,7 +152,7 @@ SCRIPT = """
 import sys
 from pathlib import Path
 from tiny_runs import tiny_training_runs
-from semgrid_edu.workshop.paper.loop import execute_plan
+from semgrid_edu.workshop.paper.run import execute_plan
 from semgrid_edu.workshop.paper.run import with_needs
 from semgrid_edu.workshop.workplace import workplace
 if __name__ == "__main__":

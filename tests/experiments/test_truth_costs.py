@@ -13,8 +13,7 @@ from semgrid_edu.workshop.flaws import TruthFlaws
 from semgrid_edu.workshop.paper import truth_costs as costs
 from semgrid_edu.workshop.paper.data_runs import ArraysRun, DataRun
 from semgrid_edu.workshop.paper.experiments import EXPERIMENTS
-from semgrid_edu.workshop.paper.loop import execute_plan
-from semgrid_edu.workshop.paper.run import with_needs
+from semgrid_edu.workshop.paper.run import execute_plan, with_needs
 from semgrid_edu.workshop.paper.run_counts import RunCounts
 from semgrid_edu.workshop.paper.scales import SCALES
 from semgrid_edu.workshop.paper.score_runs import LABELS, LabelsRun

@@ -4,14 +4,15 @@ from worlds.lecture_12_pictures import forest_plot
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.plotting import training_curves
-from semgrid_edu.training.log import TrainingLog
+from semgrid_edu.training.log import COLUMNS
 
 
 def _log(image=200, grid=100):
     iteration = np.arange(image + grid)
     stage = np.repeat(["image", "grid"], [image, grid])
     noise = np.where(iteration % 2, 0.5, -0.5)
-    return TrainingLog(iteration, stage, np.full(len(iteration), 0.1), np.where(stage == "image", 2.0, 3.0) + noise)
+    columns = iteration, stage, np.full(len(iteration), 0.1), np.where(stage == "image", 2.0, 3.0) + noise
+    return np.rec.fromarrays(columns, COLUMNS)
 
 
 def _curves(ax):

@@ -23,8 +23,7 @@ from semgrid_edu.training.batches import Batch
 from semgrid_edu.training.devices import open_fabric
 from semgrid_edu.training.loop import learn
 from semgrid_edu.workshop.paper.data_runs import ArraysRun
-from semgrid_edu.workshop.paper.loop import few_threads
-from semgrid_edu.workshop.paper.run import Run
+from semgrid_edu.workshop.paper.run import Run, few_threads
 from semgrid_edu.workshop.paper.variants import USUAL, Variant
 from semgrid_edu.workshop.simulation.sensors.rig import Rig
 from semgrid_edu.workshop.training_run import architecture, training_params

@@ -333,7 +333,8 @@ def baseline_grids(
     returns = returns or frames.returns
     majority = majority_class(truths)
     by_state = majority_by_state(truths, training.arrays["occupancy"])
-    labellers = _labellers(segmenters)
+    networks = {name: partial(best_labels, segmenter) for name, segmenter in segmenters.items()}
+    labellers: dict[str, Labeller] = {"true": lambda sample: sample.labels.numpy(), **networks}
     tables = fitted_tables(training, labellers, ground_pixels(training.spec, training.camera))
     ground = ground_pixels(frames.spec, camera or frames.camera)
     n_classes = len(frames.label_set)
@@ -351,12 +352,6 @@ def baseline_grids(
         return found
 
     return grids
-
-
-def _labellers(segmenters: Mapping[str, nn.Module]) -> dict[str, Labeller]:
-    """Return functions that label images, by name: the true labels and each network."""
-    networks = {name: partial(best_labels, segmenter) for name, segmenter in segmenters.items()}
-    return {"true": lambda sample: sample.labels.numpy(), **networks}
 
 
 def carried_grids(
