@@ -13,10 +13,7 @@ from semgrid_edu.plotting.animations import (
     particles,
     velocity_wheel,
 )
-from semgrid_edu.plotting.charts import (
-    confusion,
-    training_curves,
-)
+from semgrid_edu.plotting.charts import confusion, training_curves
 from semgrid_edu.plotting.colours import (
     DEPTH_RANGE,
     HEADING_COLOURS,

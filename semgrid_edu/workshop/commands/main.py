@@ -13,14 +13,7 @@ from semgrid_edu import __version__
 from semgrid_edu.errors import ArgumentError, DataError, MissingExtraError
 from semgrid_edu.fast.numba_cache import keep_compiled_functions
 from semgrid_edu.storage.files import CACHE_VARIABLE
-from semgrid_edu.workshop.commands.arguments import (
-    Commands,
-    as_typed,
-    check_arguments,
-    dataset_doubts,
-    drive_in,
-    tell,
-)
+from semgrid_edu.workshop.commands.arguments import Commands, as_typed, check_arguments, dataset_doubts, drive_in, tell
 from semgrid_edu.workshop.commands.course import course
 from semgrid_edu.workshop.commands.data import data
 from semgrid_edu.workshop.commands.experiments import reproduce

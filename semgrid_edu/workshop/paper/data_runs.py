@@ -71,9 +71,8 @@ class ArraysRun(Run):
     preset: str = "compact"
     fine: bool = False
     kind = "arrays"
-    size = property(
-        lambda self: f"-{self.preset}" * (self.preset != "compact") + "-fine" * self.fine
-    )  # the part of the name
+    # The part of the name that says so.
+    size = property(lambda self: f"-{self.preset}" * (self.preset != "compact") + "-fine" * self.fine)
     tag = property(lambda self: f"{self.data.tag}-{self.split}-{self.truth}{self.size}")
     built = property(lambda self: self.preset + "-fine" * self.fine)  # what the time of a step depends on
     pace = property(lambda self: f"arrays {self.built}")
