@@ -70,8 +70,10 @@ def seen_returns(
     returns, uv = closest_returns(frame)
     rows, cols, inside = spec.cells(frame.points_grid[returns])
     u, v = uv[inside].T
-    scale_v, scale_u = image_size[0] / frame.camera.size[0], image_size[1] / frame.camera.size[1]
-    row, col = ((v + 0.5) * scale_v).astype(np.int32), ((u + 0.5) * scale_u).astype(np.int32)
+    scale_v = image_size[0] / frame.camera.size[0]
+    scale_u = image_size[1] / frame.camera.size[1]
+    row = ((v + 0.5) * scale_v).astype(np.int32)
+    col = ((u + 0.5) * scale_u).astype(np.int32)
     return row * image_size[1] + col, (rows * spec.shape[1] + cols)[inside].astype(np.int32)
 
 
@@ -192,7 +194,9 @@ def birdseye_votes(
     """
     rows, cols, inside = spec.cells(points_grid)
     kept = inside & (classes != IGNORE)
-    cells, z, classes = (rows * spec.shape[1] + cols)[kept], points_grid[kept, 2], classes[kept]
+    cells = (rows * spec.shape[1] + cols)[kept]
+    z = points_grid[kept, 2]
+    classes = classes[kept]
     lowest = np.full(spec.shape[0] * spec.shape[1], np.inf, dtype=z.dtype)
     np.minimum.at(lowest, cells, z)
     below = z <= lowest[cells] + CLEARANCE

@@ -225,7 +225,8 @@ class Mixture(Sequence[Sample]):
             raise ArgumentError("data_sets", "at least one data set, each of at least one camera", "none")
         self._data_sets = data_sets
         self.parts = tuple(part for parts in data_sets for part in parts)
-        self.label_set, self.camera = self.parts[0].label_set, self.parts[0].camera
+        self.label_set = self.parts[0].label_set
+        self.camera = self.parts[0].camera
         for part in self.parts:
             if part.label_set != self.label_set:
                 raise ArgumentError("data_sets", f"the label set {self.label_set.name} in each", part.label_set.name)

@@ -72,7 +72,8 @@ def velocity(
         Covariance of the velocity, `Belief.velocity_covariance`, m^2/s^2.
     """
     start, speed = velocity_arrows(spec, probability, velocity, covariance)
-    (x, y), (vx, vy) = start.T, speed.T * ARROW_SECONDS
+    (x, y) = start.T
+    (vx, vy) = speed.T * ARROW_SECONDS
     ax.quiver(y, x, vy, vx, angles="xy", scale_units="xy", scale=1.0, color="#6a1b9a", width=0.007, zorder=3)
     ax.set_xlabel(f"{ax.get_xlabel()}\narrows: distance covered in {ARROW_SECONDS} s")
     return ax

@@ -307,6 +307,8 @@ def skew_scan(points: NDArray, velocity: EgoVelocity) -> NDArray:
 
 def _turned(xy: NDArray, angles: NDArray) -> NDArray[np.float64]:
     """Turn each point to the left by its angle, radians."""
-    cos, sin = np.cos(angles), np.sin(angles)
-    x, y = xy[:, 0], xy[:, 1]
+    cos = np.cos(angles)
+    sin = np.sin(angles)
+    x = xy[:, 0]
+    y = xy[:, 1]
     return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)

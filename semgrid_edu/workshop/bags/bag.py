@@ -103,7 +103,8 @@ def open_bag(path: Path) -> Iterator[Bag]:
     MissingExtraError
         When `rosbags` isn't installed.
     """
-    highlevel, typesys = needed("rosbags.highlevel"), needed("rosbags.typesys")
+    highlevel = needed("rosbags.highlevel")
+    typesys = needed("rosbags.typesys")
     if not path.exists():
         raise DataError(path, EXPECTED, "nothing of this name")
     if path.is_dir() and not (path / "metadata.yaml").exists():

@@ -53,7 +53,8 @@ class StaticTransforms:
             Transforms to any frames.
         """
         for one in message.transforms:
-            child, parent = one.child_frame_id.lstrip("/"), one.header.frame_id.lstrip("/")
+            child = one.child_frame_id.lstrip("/")
+            parent = one.header.frame_id.lstrip("/")
             numbers = _numbers(one.transform.translation, one.transform.rotation)
             known_parent, known = self.links.setdefault(child, (parent, numbers))
             if parent != known_parent or not np.allclose(numbers, known, rtol=0, atol=FIXED):

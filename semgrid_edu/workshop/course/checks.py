@@ -161,7 +161,9 @@ def text_problems(notebook: NotebookNode, folder: Path) -> Iterator[str]:
 
 def _problems(source: Path, parts: dict[str, str], rules: Iterable[Callable]) -> Iterator[str]:
     """List what is wrong with a lecture or a companion; they differ in the parts they need and the rules they keep."""
-    wanted, path, name = read_percent(source), built_path(source), notebook_name(source)
+    wanted = read_percent(source)
+    path = built_path(source)
+    name = notebook_name(source)
     text = "\n\n".join(cell.source for cell in wanted.cells)
     yield from (f"lacks {part}" for part, pattern in parts.items() if not re.search(pattern, text, re.MULTILINE))
     if not path.is_file():

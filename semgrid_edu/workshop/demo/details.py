@@ -67,7 +67,8 @@ class StoryMaps(NamedTuple):
 
     def layout(self) -> dict[str, list[int]]:
         """Return for each name where its bytes begin, K, and the steps to a cell's next byte and to the next cell."""
-        n_cells, places = next(iter(self.smooth.values()))[0].size, {}
+        n_cells = next(iter(self.smooth.values()))[0].size
+        places = {}
         per_cell = sum(map(len, self.alike.values()))
         for at, maps, step, stride in ((0, self.alike, 1, per_cell), (per_cell * n_cells, self.smooth, n_cells, 1)):
             for name, part in maps.items():
@@ -211,7 +212,8 @@ def story_data(net: SemanticGridNet, camera: Camera, frame_layout: dict[str, lis
         colours, the rounding, and the maps of all frames.
     """
     architecture = net.need_architecture()
-    spec, label_set = architecture.grid, LABEL_SETS[architecture.label_set]
+    spec = architecture.grid
+    label_set = LABEL_SETS[architecture.label_set]
     places = cell_places(spec, architecture.heights, camera)
     return {
         "grid": {**asdict(spec), "rows": spec.shape[0], "cols": spec.shape[1]},

@@ -105,7 +105,8 @@ def _panels(result: FrameResult, record: Record, whose: str = "", of: Sequence[s
 
 def _draw_panel(ax: Axes, panel: GridPicture, record: Record) -> None:
     """Draw the occupancy grid with velocities, or a map of classes."""
-    spec, belief = record.spec, panel.result.belief
+    spec = record.spec
+    belief = panel.result.belief
     if panel.labels is None:
         plotting.occupancy(spec, belief.probability, ax, legend=False)
         plotting.velocity(spec, belief.probability, belief.velocity, ax, belief.velocity_covariance)

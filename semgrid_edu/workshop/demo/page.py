@@ -167,14 +167,16 @@ def _single_or_pair(panel: Panel, record: Record, camera: Camera) -> str:
     if comparison is None or panel.name not in comparison.changed:
         return _figure(panel, record, camera)
     package = panel._replace(title=f"{panel.title}, the package's")
-    title, symbol = f"{panel.title}, {comparison.file}", panel.symbol.removesuffix(" after the CRF")
+    title = f"{panel.title}, {comparison.file}"
+    symbol = panel.symbol.removesuffix(" after the CRF")
     yours = Panel(YOURS + panel.name, title, symbol, comparison.made_with(panel.name))
     return f'<div class="pair">{_figure(package, record, camera)}{_figure(yours, record, camera)}</div>'
 
 
 def _figure(panel: Panel, record: Record, camera: Camera) -> str:
     first = record.views[0]
-    raster, text = first.images.get(panel.name, ""), escape(first.texts.get(panel.name, ""))
+    raster = first.images.get(panel.name, "")
+    text = escape(first.texts.get(panel.name, ""))
     svg = grid_svg(panel.name, record.spec, camera, raster, text, arrows=panel.name in first.arrows)
     hidden = " hidden" if panel.name in first.images else ""
     missing = f'<p class="note" data-missing="{panel.name}"{hidden}>Nobody labelled this frame.</p>'
@@ -193,7 +195,8 @@ def _your_scores(first: FrameView, camera: Camera, comparison: Comparison | None
     if comparison is None or "scores" not in comparison.changed:
         return ""
     name = f"{YOURS}scores"
-    image, text = first.images[name], escape(first.texts[name])
+    image = first.images[name]
+    text = escape(first.texts[name])
     return (
         f'\n<figure>\n<div class="stack"><img data-image="photo" src="{first.images["photo"]}" alt="">'
         f'<img data-image="{name}" data-text="{name}" src="{image}" alt="{text}">{_column_svg(camera)}</div>\n'

@@ -143,8 +143,10 @@ def grid_svg(name: str, spec: GridSpec, camera: Camera, raster: str, text: str, 
     str
         An svg element.
     """
-    width, height = spec.y_max - spec.y_min, spec.x_max - spec.x_min
-    left, top = -spec.y_max, -spec.x_max
+    width = spec.y_max - spec.y_min
+    height = spec.x_max - spec.x_min
+    left = -spec.y_max
+    top = -spec.x_max
     box = f'x="{left:g}" y="{top:g}" width="{width:g}" height="{height:g}"'
     href = f'href="{raster}"' if raster else ""
     compared = name.endswith(("grid", "refined", "remembered"))
@@ -184,7 +186,8 @@ def arrows_path(spec: GridSpec, probability: NDArray, velocity: NDArray, covaria
     way = speed * ARROW_SECONDS
     end = start + way
     length = np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
-    back, side = -way / length, way[:, ::-1] * (1, -1) / length
+    back = -way / length
+    side = way[:, ::-1] * (1, -1) / length
     barbs = [end + 0.9 * back + sign * 0.5 * side for sign in (1, -1)]
     arrows = zip(*(map(_svg, points) for points in (start, end, *barbs)), strict=True)
     return "".join(f"M{a}L{b}M{c}L{b}L{d}" for a, b, c, d in arrows)
@@ -196,7 +199,8 @@ def _svg(xy: NDArray) -> str:
 
 def _axes(spec: GridSpec) -> str:
     """Draw marks, numbers and names of the axes, at the left side and at the bottom."""
-    left, bottom = -spec.y_max, -spec.x_min
+    left = -spec.y_max
+    bottom = -spec.x_min
     marks = [
         f'<path class="tick" d="M{left:g} {-x}h-.7"/><text class="x" x="{left - 1.1:g}" y="{-x + 0.7:g}">{x}</text>'
         for x in _ticks(spec.x_min, spec.x_max)
@@ -205,7 +209,8 @@ def _axes(spec: GridSpec) -> str:
         f'<path class="tick" d="M{-y} {bottom:g}v.7"/><text class="y" x="{-y}" y="{bottom + 2.8:g}">{y}</text>'
         for y in _ticks(spec.y_min, spec.y_max)
     ]
-    middle_x, middle_y = -(spec.x_min + spec.x_max) / 2, -(spec.y_min + spec.y_max) / 2
+    middle_x = -(spec.x_min + spec.x_max) / 2
+    middle_y = -(spec.y_min + spec.y_max) / 2
     marks = [
         f"<g data-axes>{''.join(marks)}</g>",
         f'<text transform="translate({left - 4.8:g} {middle_x:g})rotate(-90)">x, forward [m]</text>',

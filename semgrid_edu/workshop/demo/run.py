@@ -195,7 +195,8 @@ def write_demo(
     if stages is not None:
         runs.append(mine.over(runs[0]))
         comparison = Comparison(Path(stages).name, mine.given, memory)
-    spec, label_set = net.architecture.grid, LABEL_SETS[net.architecture.label_set]
+    spec = net.architecture.grid
+    label_set = LABEL_SETS[net.architecture.label_set]
     stories = _stories_every(len(chosen.shown), spec)
     record = Record(spec, label_set, chosen.shown, comparison, net, stories, memory)
     left_out: dict[int, str] = {}
@@ -343,7 +344,8 @@ def _card_beside(weights: str | Path) -> dict[str, object]:
     if not card.exists():
         return {}
     content = read_json(card)
-    known, learned = content.get("other_streets", ""), content.get("learned_drives", [])
+    known = content.get("other_streets", "")
+    learned = content.get("learned_drives", [])
     if not isinstance(known, str):
         raise DataError(card, "other_streets: a text", repr(known)[:200])
     if not (isinstance(learned, list) and all(isinstance(name, str) for name in learned)):

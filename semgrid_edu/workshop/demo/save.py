@@ -204,7 +204,8 @@ def world_map(occupancy: NDArray, classes: NDArray, T_world_from_lidar: NDArray,
         drawn[window][known] = labels[rows, cols].reshape(known.shape)[known]
         moved[window] |= state == State.DYNAMIC
     wiped = moved & (pixels == OCCUPIED_PIXEL)
-    pixels[wiped], drawn[wiped] = UNSEEN_PIXEL, IGNORE
+    pixels[wiped] = UNSEEN_PIXEL
+    drawn[wiped] = IGNORE
     return WorldMap(pixels[::-1].T, drawn[::-1].T, (world.x_min, world.y_min))
 
 
@@ -214,7 +215,8 @@ def _corners(spec: GridSpec) -> NDArray:
 
 def _around(points: NDArray, cell: float) -> GridSpec:
     """Return a grid of the world, with borders at multiples of the cell, that reaches beyond all points."""
-    low, high = np.floor(points.min(axis=0) / cell) - 1, np.ceil(points.max(axis=0) / cell) + 1
+    low = np.floor(points.min(axis=0) / cell) - 1
+    high = np.ceil(points.max(axis=0) / cell) + 1
     (x_min, x_max), (y_min, y_max) = (np.stack([low, high]) * cell).T.tolist()
     return GridSpec(x_min, x_max, y_min, y_max, cell)
 

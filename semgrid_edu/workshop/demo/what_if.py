@@ -44,7 +44,9 @@ def what_if(result: FrameResult, net: SemanticGridNet) -> dict[str, NDArray[np.i
         where the frame has labels, "true image" (`right_scores`), "true occupancy" (`right_occupancy`) and "both true".
         Nothing else changes.
     """
-    s, o, labels = result.scores, result.belief.probability, result.frame.labels
+    s = result.scores
+    o = result.belief.probability
+    labels = result.frame.labels
     spec = net.need_architecture().grid
     z = cell_heights(result.frame.points_grid, spec)
     changed = {

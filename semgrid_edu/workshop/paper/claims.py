@@ -64,7 +64,8 @@ class Statement(NamedTuple):
     @property
     def confirmed(self) -> bool:
         """Whether the whole interval is on the claimed side."""
-        low, high = self.value["low"], self.value["high"]
+        low = self.value["low"]
+        high = self.value["high"]
         if low is None or high is None:
             return False
         return low > self.limit if self.above else high < self.limit
@@ -207,7 +208,9 @@ def _share(part: float, whole: float) -> float:
 def _effect_of_distance(one: Reading) -> list[Statement]:
     bands = {band: one.counted(one.usual, band=band) for band in distance_band_names()}
     first, second, *others = bands.values()
-    near, middle, far = first + second, others[0] + others[1], sum(others[2:])
+    near = first + second
+    middle = others[0] + others[1]
+    far = sum(others[2:])
     every = range(KITTI_14.n_semantic)
     kinds = {"all": every, "standing": [c for c in every if KITTI_14.names[c] not in KITTI_14.flat]}
     pairs = {"0-20 m - 20-40 m": (near, middle), "20-40 m - beyond": (middle, far), "0-10 m - 10-20 m": (first, second)}
@@ -263,7 +266,8 @@ def _effect_of_reduction(one: Reading) -> list[Statement]:
 
 
 def _geometry_and_learning(one: Reading) -> list[Statement]:
-    runs, network = one.runs, one.counted(one.usual)
+    runs = one.runs
+    network = one.counted(one.usual)
     off = one.counted(runs.usual_off)
     geometry = one.counted(runs.baselines, GEOMETRY)
     geometry_off = one.counted(runs.baselines_off, GEOMETRY)

@@ -120,8 +120,10 @@ def boxes_on(spec: GridSpec, objects: list[dict], margin: float = 0.25) -> NDArr
     inside = np.zeros(spec.shape, bool)
     for one in objects:
         x, y = np.moveaxis(spec.centers() - np.array(one["centre"][:2]), -1, 0)
-        c, s = np.cos(one["yaw"]), np.sin(one["yaw"])
-        ahead, left = c * x + s * y, c * y - s * x
+        c = np.cos(one["yaw"])
+        s = np.sin(one["yaw"])
+        ahead = c * x + s * y
+        left = c * y - s * x
         inside |= (np.abs(ahead) <= one["size"][0] / 2 + margin) & (np.abs(left) <= one["size"][1] / 2 + margin)
     return inside
 

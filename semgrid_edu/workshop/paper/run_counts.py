@@ -144,5 +144,6 @@ def _smallest(array: NDArray) -> NDArray:
     """Return whole numbers in the smallest type that holds them; other arrays as they are."""
     if array.dtype.kind not in "iu" or not array.size:
         return array
-    low, high = int(array.min()), int(array.max())
+    low = int(array.min())
+    high = int(array.max())
     return array.astype(np.min_scalar_type(high if low >= 0 else min(low, -high - 1)))

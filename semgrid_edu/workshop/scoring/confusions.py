@@ -268,7 +268,8 @@ def count_grids(grids: Grids, frames: TrainingSet) -> GridCounts:
     ArgumentError
         When the shape of a grid differs from the truth, or it contains a class that the frames don't have.
     """
-    truths, band = truths_of_frames(frames), distance_bands(frames.spec, BANDS)
+    truths = truths_of_frames(frames)
+    band = distance_bands(frames.spec, BANDS)
     counts: dict[str, list[NDArray]] = {}
     confidence: dict[str, NDArray] = {}
     methods: dict[str, None] = {}
@@ -295,7 +296,8 @@ def truths_of_frames(frames: TrainingSet) -> dict[str, NDArray]:
     frames : TrainingSet
         The frames. Labels made with the LIDAR are called "lidar".
     """
-    truth, true = frames.arrays["truth"], frames.arrays["true"]
+    truth = frames.arrays["truth"]
+    true = frames.arrays["true"]
     return {"true": true} if truth is true else {"lidar": truth, "true": true}
 
 

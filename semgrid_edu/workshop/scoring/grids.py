@@ -92,7 +92,8 @@ def inverse_perspective(labels: NDArray, places: NDArray, occupancy: NDArray, ob
     ArgumentError
         When a pixel is outside the labels, or the shapes of `places` and `occupancy` disagree.
     """
-    labels, unknown = np.asarray(labels), unknown_classes(occupancy)
+    labels = np.asarray(labels)
+    unknown = unknown_classes(occupancy)
     if places.shape != unknown.shape:
         raise ArgumentError("places", f"one for each of {unknown.shape} cells", f"shape {places.shape}")
     if places.max() >= labels.size:
@@ -136,7 +137,8 @@ def count_labels_and_states(frames: TrainingSet, labeller: Labeller, places: NDA
     shape = (n_classes + 1, N_STATES, n_classes)
     counts = np.zeros(shape, np.int64)
     for k in range(len(frames)):
-        truth, state = frames.arrays["truth"][k], np.argmax(frames.arrays["occupancy"][k], axis=0)
+        truth = frames.arrays["truth"][k]
+        state = np.argmax(frames.arrays["occupancy"][k], axis=0)
         known = truth != IGNORE
         cells = ground_labels(labeller(frames[k]), places, n_classes)[known], state[known], truth[known]
         counts += np.bincount(np.ravel_multi_index(cells, shape), minlength=counts.size).reshape(shape)

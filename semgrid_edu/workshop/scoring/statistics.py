@@ -92,7 +92,8 @@ def drive_estimate(confusions: ArrayLike, metric: Metric) -> EstimatedMean:
 
 def paired_estimate(a: ArrayLike, b: ArrayLike, metric: Metric) -> EstimatedMean:
     """Return the mean score of a minus b, with variances. Parameters are those of `paired_interval`."""
-    a, b = _checked("a", a), _checked("b", b)
+    a = _checked("a", a)
+    b = _checked("b", b)
     if a.shape[1:] != b.shape[1:] or (len(a) != len(b) and 1 not in (len(a), len(b))):
         raise ArgumentError("b", f"the seeds and drives of a, shape {a.shape}", f"shape {b.shape}")
     return _estimate(*(of_a - of_b for of_a, of_b in zip(_left_out(a, metric), _left_out(b, metric), strict=True)))

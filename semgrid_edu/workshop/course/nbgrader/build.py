@@ -60,7 +60,8 @@ def student_version(source: Path) -> NotebookNode:
     source : Path
         The source, `notebooks/src/exercises/NAME.py`, with nbgrader's markers and metadata.
     """
-    notebook, resources = read_percent(source), {}
+    notebook = read_percent(source)
+    resources = {}
     for step in RELEASE_STEPS:
         notebook, resources = step().preprocess(notebook, resources)
     return notebook
@@ -202,7 +203,8 @@ def point_links(text: str, lectures: str) -> str:
 
 def _write_unless_changed(directory: Path, texts: dict, before: dict) -> tuple[dict[str, str], list[str]]:
     """Write files except those that were changed since the last time; return all digests, and which files were kept."""
-    digests, kept = {}, []
+    digests = {}
+    kept = []
     for name, text in texts.items():
         path = directory / name
         now = _digest(path.read_bytes()) if path.exists() else before.get(name)
@@ -260,7 +262,8 @@ def caught_errors(log: logging.Logger) -> Iterator[list[BaseException]]:
     handler = logging.Handler(logging.ERROR)
     handler.emit = lambda record: errors.extend(filter(None, [sys.exc_info()[1]]))
     log.addHandler(handler)
-    was_silent, GRADEBOOK_LOG.disabled = GRADEBOOK_LOG.disabled, True
+    was_silent = GRADEBOOK_LOG.disabled
+    GRADEBOOK_LOG.disabled = True
     try:
         yield errors
     finally:

@@ -70,7 +70,8 @@ def grade_course(
     UngradedError
         At the end, if submissions stay ungraded for a reason that isn't theirs. It lists them, one per line.
     """
-    course, failed = course.resolve(), {}
+    course = course.resolve()
+    failed = {}
     wanted = submissions(course, assignments) if again else book.ungraded(course, assignments)
     yield from _in_pools(course, wanted, settings, workers, failed)
     if failed:

@@ -154,14 +154,16 @@ class ExecuteApart(NbGraderPreprocessor):
 
     def preprocess(self, nb: NotebookNode, resources: ResourcesDict) -> tuple[NotebookNode, ResourcesDict]:
         """Run one notebook. Parameters are those of `MakeWhole.preprocess`."""
-        where, course = resources["nbgrader"], Path(self.course)
+        where = resources["nbgrader"]
+        course = Path(self.course)
         prepared = prepare(course, where["assignment"], self.memory)
         if self.seed_by_student:
             use_instructor(course / "instructor", student_variant(course, where["student"]))
         with Gradebook(where["db_url"]) as gradebook:
             exercise = gradebook.find_notebook(where["notebook"], where["assignment"])
             trusted = {cell.name: cell.source for cell in exercise.source_cells}
-        limits, beside = Limits(memory=self.memory), Path(resources["metadata"]["path"])
+        limits = Limits(memory=self.memory)
+        beside = Path(resources["metadata"]["path"])
         start = partial(StudentProcess, limits, prepared, beside=beside)
         resources[CRASHES] = run_submission(nb, trusted, start, self.timeout)
         return nb, resources
@@ -251,7 +253,8 @@ class NoteCrashes(NbGraderPreprocessor):
         resources : ResourcesDict
             nbgrader's information about it: student, assignment, gradebook.
         """
-        where, answer = resources["nbgrader"], ""
+        where = resources["nbgrader"]
+        answer = ""
         with Gradebook(where["db_url"]) as gradebook:
             for cell in nb.cells:
                 name = cell_name(cell)

@@ -27,7 +27,8 @@ def dishonest_minutes(notebook: NotebookNode) -> Iterator[str]:
     notebook : NotebookNode
         An executed notebook.
     """
-    needed, stated = round(reading_time(notebook).minutes), stated_minutes(notebook)
+    needed = round(reading_time(notebook).minutes)
+    stated = stated_minutes(notebook)
     if stated is not None and stated < needed:
         yield f"states {stated} minutes and takes {needed}; `semgrid-edu course minutes NAME` shows where they go"
 

@@ -118,8 +118,10 @@ def _readable() -> tuple[list[Path], list[Path]]:
 
     It may read Python, libraries, and this package except for the sources of the exercises.
     """
-    package, hidden = Path(semgrid_edu.__file__).parent, shipped_folder("notebooks")
-    look, read = [], []
+    package = Path(semgrid_edu.__file__).parent
+    hidden = shipped_folder("notebooks")
+    look = []
+    read = []
     for place in (*SYSTEM, sys.prefix, sys.base_prefix, package, shipped_folder("data_samples")):
         above, without = _all_but(Path(place).resolve(), hidden.resolve())
         look += above
@@ -133,7 +135,8 @@ def _all_but(folder: Path, hidden: Path) -> tuple[list[Path], list[Path]]:
         return [], []
     if folder not in hidden.parents:
         return [], [folder]
-    look, read = [folder], []
+    look = [folder]
+    read = []
     for child in folder.iterdir():
         # The target of a link is readable only if it is listed itself.
         if not child.is_symlink():

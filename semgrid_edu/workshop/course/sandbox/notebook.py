@@ -78,7 +78,8 @@ def run_submission(
     ChildProcessError
         When no process could be started for her code, which proves nothing about her answers.
     """
-    seen, unseen = Session(start, timeout), Session(start, timeout, secret=True)
+    seen = Session(start, timeout)
+    unseen = Session(start, timeout, secret=True)
     tests = TestCells(seen, unseen)
     try:
         _prepare(notebook, trusted, tests)
@@ -119,7 +120,8 @@ class TestCells:
     __test__ = False  # for pytest
 
     def __init__(self, seen: Session, unseen: Session) -> None:
-        self.seen, self.unseen = seen, unseen
+        self.seen = seen
+        self.unseen = unseen
         self.names: dict[str, Any] = {"__name__": "__main__"}
         self.used: set[str] = set()
         self.postponed: dict[str, list[Callable[[], str]]] = {}
@@ -155,7 +157,8 @@ class TestCells:
             answers = self._answers(self.used | _global_names(code))
         except ENDS as error:
             return [_as_output(error, file)]
-        self.seen.printed, self.seen.postponed = "", []
+        self.seen.printed = ""
+        self.seen.postponed = []
         self.seen.begin()
         error = self._run_among(code, answers)
         self.postponed[name] = self.seen.postponed if error is None else []
@@ -224,7 +227,8 @@ def _run_seen(notebook: NotebookNode, trusted: Mapping[str, str], tests: TestCel
     room = MAX_OUTPUT_TEXT
     ended = {}
     for number, cell in enumerate((c for c in notebook.cells if c.cell_type == "code"), start=1):
-        cell.execution_count, tests.seen.ended = number, ""
+        cell.execution_count = number
+        tests.seen.ended = ""
         cell.outputs, room = _shortened(_outputs(cell, trusted, tests), room)
         # A student can raise errors of any name, so only the grader's side decides what ended her process.
         if tests.seen.ended:

@@ -157,7 +157,9 @@ class StudentProcess:
         keeps: bool = False,
         beside: Path | None = None,
     ) -> None:
-        self.prepared, self.keeps, self.namespace = prepared, keeps, ""
+        self.prepared = prepared
+        self.keeps = keeps
+        self.namespace = ""
         self.folder = Path(tempfile.mkdtemp(prefix="semgrid-answers-"))
         if prepared is not None:
             shutil.copytree(prepared, self.folder / PREPARED, ignore=ONLY_WHOLE)

@@ -141,7 +141,8 @@ def memory_held(processes: list[Path]) -> int:
     processes : list of Path
         `/proc/PID` of each.
     """
-    kinds, held = ("Pss_Anon:", "Pss_Shmem:", "SwapPss:"), 0
+    kinds = ("Pss_Anon:", "Pss_Shmem:", "SwapPss:")
+    held = 0
     for place in processes:
         with suppress(OSError):
             lines = map(str.split, (place / "smaps_rollup").read_text().splitlines())
@@ -197,7 +198,9 @@ def disk_use(folder: Path, max_bytes: float = inf, since: float = -inf) -> float
     since : float
         Only files that were changed since then, seconds of `time.time`.
     """
-    size, count, waiting = 0, 0, [str(folder)]
+    size = 0
+    count = 0
+    waiting = [str(folder)]
     while waiting:
         try:
             with os.scandir(waiting.pop()) as entries:
@@ -206,7 +209,8 @@ def disk_use(folder: Path, max_bytes: float = inf, since: float = -inf) -> float
                     with suppress(FileNotFoundError):
                         found = entry.stat(follow_symlinks=False)
                         used = getattr(found, "st_blocks", 0) * 512 or found.st_size
-                        size, count = size + used * (found.st_mtime >= since), count + 1
+                        size = size + used * (found.st_mtime >= since)
+                        count = count + 1
                         if stat.S_ISDIR(found.st_mode):
                             waiting.append(entry.path)
                     if size > max_bytes or count > MAX_FILES:
@@ -247,7 +251,9 @@ class PeakMemory:
     """
 
     def __init__(self, pid: int, folder: Path) -> None:
-        self.pid, self.folder, self.ended = pid, folder, threading.Event()
+        self.pid = pid
+        self.folder = folder
+        self.ended = threading.Event()
         self.thread = threading.Thread(target=self._sample_family, daemon=True)
         try:
             Path(f"/proc/{pid}/clear_refs").write_text("5")  # resets the peak

@@ -69,7 +69,9 @@ class Session:
     """
 
     def __init__(self, start: Callable[[], StudentProcess], timeout: float, secret: bool = False) -> None:
-        self.start, self.timeout, self.secret = start, timeout, secret
+        self.start = start
+        self.timeout = timeout
+        self.secret = secret
         self.process: StudentProcess | None = None
         self.cells: list[tuple[str, float]] = []
         self.waiting: list[tuple[str, float]] = []
@@ -200,14 +202,17 @@ class Session:
         if self.left_in_all <= 0:
             self.ended = f"all cells together have used up their time, {TOTAL_TIME * self.timeout:g} s"
             raise AnswerTimeoutError(self.ended)
-        process, began = self._alive(), time.monotonic()
+        process = self._alive()
+        began = time.monotonic()
         try:
             return process.ask(message, began + self.left, callbacks)
         except TimeoutError:
-            self.process, self.ended = None, f"no reply before timeout, {self.allowed:g} s: does a loop never end?"
+            self.process = None
+            self.ended = f"no reply before timeout, {self.allowed:g} s: does a loop never end?"
             raise AnswerTimeoutError(self.ended) from None
         except ProcessEndedError:
-            self.process, self.ended = None, "Python itself ended here: by exit(), a crash, or for want of memory?"
+            self.process = None
+            self.ended = "Python itself ended here: by exit(), a crash, or for want of memory?"
             raise AnswerEndedError(self.ended) from None
         finally:
             self.left -= time.monotonic() - began
@@ -230,7 +235,8 @@ class Session:
             raise NoProcessError(f"no process could be started for students' code: {error}") from error
         self.left_in_all -= time.monotonic() - began
         times = self.allowed / self.timeout
-        cells, self.cells = self.cells, []
+        cells = self.cells
+        self.cells = []
         for earlier in cells:
             self.run(*earlier)
         self.begin(times)
@@ -263,7 +269,8 @@ class RemoteFunction:
     """
 
     def __init__(self, session: Session, name: str, unseen: Session | None = None) -> None:
-        self.session, self.__name__ = session, name
+        self.session = session
+        self.__name__ = name
         self.unseen = RemoteFunction(unseen, name) if unseen else self
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:

@@ -180,7 +180,8 @@ def _path(value: Any) -> str | None:
 
 def _arrays(described: list, data: bytes) -> dict[int, NDArray]:
     """Cut the bytes of a message into arrays, each of which may be used once in the value."""
-    found, start = [], 0
+    found = []
+    start = 0
     for text, shape in described:
         dtype = np.dtype(text)
         if dtype.kind not in KINDS or not all(type(n) is int and n >= 0 for n in shape):
@@ -281,7 +282,8 @@ class Wire:
     """
 
     def __init__(self, incoming: BinaryIO, outgoing: BinaryIO) -> None:
-        self.incoming, self.outgoing = incoming, outgoing
+        self.incoming = incoming
+        self.outgoing = outgoing
 
     def send(self, message: bytes) -> None:
         """Send a message.

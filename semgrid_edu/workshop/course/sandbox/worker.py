@@ -155,7 +155,8 @@ class Worker:
             except BaseException as error:
                 reply = {"error": _report(error)}
         before = decode(sent, self._callback)
-        given, now = (before["arguments"], before["named"]), _what_passes((arguments, named))
+        given = (before["arguments"], before["named"])
+        now = _what_passes((arguments, named))
         if encode(given, [], MAX_INPUT) != encode(now, [], MAX_INPUT):
             reply["changed"] = now
         return reply | {"streams": _streams(captured)}
@@ -205,7 +206,8 @@ def _text(text: str) -> str:
 
 def _shown(outputs: list[RichOutput]) -> list[dict[str, str]]:
     """Return the displayed texts and pictures, until there are too many."""
-    kept, size = [], 0
+    kept = []
+    size = 0
     for output in outputs[:MAX_OUTPUTS]:
         data = {kind: data for kind, data in output.data.items() if isinstance(data, str)}
         size += sum(map(len, data.values()))
