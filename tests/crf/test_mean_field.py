@@ -53,15 +53,6 @@ def test_filters_give_the_naive_result_up_to_the_lattice(infer, structured):
         assert exact.dtype == np.float64
 
 
-@FILTERS
-@pytest.mark.parametrize("normalization", ["symmetric", "none"])
-def test_without_the_lattice_filters_give_the_naive_result(infer, normalization):
-    unary, values, _ = noisy_street(0)
-    w_spatial = 2 if normalization == "symmetric" else 0.05
-    params = CrfParams(w_bilateral=0, w_spatial=w_spatial, normalization=normalization)
-    np.testing.assert_allclose(infer(unary, values, params), mean_field_naive(unary, values, params), atol=1e-5)
-
-
 @pytest.mark.parametrize("twin", [crf, fast])
 @pytest.mark.parametrize("normalization", ["symmetric", "none"])
 def test_updates_by_filters_are_those_over_the_matrices_of_the_filters(twin, normalization):
@@ -107,15 +98,6 @@ def test_a_pad_repeats_the_border_and_is_cut_off_again(infer):
 
 
 @WAYS
-def test_lonely_cells_keep_their_own_distribution(infer):
-    # Four certain, different states and no spatial kernel: nobody is near anybody, and a cell doesn't talk to itself.
-    unary = np.random.default_rng(0).normal(size=(3, 2, 2))
-    values = np.eye(4).reshape(4, 2, 2)
-    params = CrfParams(w_bilateral=50, w_spatial=0, sigma_beta=0.05)
-    np.testing.assert_allclose(infer(unary, values, params), softmax(-unary, axis=0), atol=1e-5)
-
-
-@WAYS
 @pytest.mark.parametrize(("params", "iterations"), [(CrfParams(w_bilateral=0, w_spatial=0), 10), (CrfParams(), 0)])
 def test_without_pairs_or_updates_it_is_a_softmax(infer, params, iterations):
     unary, values, _ = noisy_street(0, (6, 5))
@@ -140,24 +122,6 @@ def test_a_speck_is_smoothed_away_and_an_edge_of_occupancy_stays(infer):
     probability[:, 5, 2] = 0.3, 0.7  # a free cell that the network gives to the class of the static ones
     labels = infer(unary_from_probability(probability), values, CrfParams()).argmax(axis=0)
     np.testing.assert_array_equal(labels, np.broadcast_to(np.arange(12) >= 6, (12, 12)))
-
-
-@WAYS
-def test_the_crf_repairs_a_noisy_grid(infer):
-    unary, values, truth = noisy_street(2)
-    refined = infer(unary, values, CrfParams())
-    assert (refined.argmax(axis=0) == truth).mean() > (unary.argmin(axis=0) == truth).mean() + 0.1
-
-
-@WAYS
-def test_an_impossible_class_stays_impossible(infer):
-    unary, values, _ = noisy_street(0, (10, 8))
-    unary[3] = np.inf
-    unary[4, 2:5] = 1e300
-    Q = infer(unary, values, CrfParams())
-    assert (Q[3] == 0).all()
-    assert (Q[4, 2:5] == 0).all()
-    np.testing.assert_allclose(Q.sum(axis=0), 1, atol=1e-5)
 
 
 @WAYS

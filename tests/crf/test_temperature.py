@@ -80,15 +80,6 @@ def test_the_calibration_error_is_that_of_torchmetrics(drawn, temperature):
     assert found == pytest.approx(expected.item(), abs=1e-6)
 
 
-def test_a_fitted_temperature_lowers_the_calibration_error_of_too_sure_a_network(drawn):
-    log_p, truth = drawn
-    sure = at_temperature(log_p, 0.4)
-    fitted = at_temperature(sure, fit_temperature(sure, truth))
-    before, after = (expected_calibration_error(reliability(np.exp(part), truth)) for part in (sure, fitted))
-    assert before > 0.15
-    assert after < 0.03
-
-
 @pytest.mark.parametrize(
     ("log_p", "truth", "message"),
     [

@@ -14,12 +14,6 @@ from semgrid_edu.graphical.rendering import NODE, GraphPicture
 ROWS = in_rows(["m1", "m2"], ["z"])
 
 
-@pytest.fixture(autouse=True)
-def _close_figures():
-    yield
-    plt.close("all")
-
-
 def pieces(ax, kind):
     return [artist for artist in ax.get_children() if type(artist) is kind and artist is not ax.patch]
 

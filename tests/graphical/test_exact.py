@@ -1,7 +1,5 @@
 """Exact inference: by hand, against the sum over every assignment, and against pyagrum (test_pyagrum.py)."""
 
-import itertools
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -64,28 +62,6 @@ def test_elimination_is_the_sum_over_every_assignment(make, seed, zeros):
     found = eliminate(model, names, evidence, order=order)
     assert found.names == tuple(names)
     np.testing.assert_allclose(found.table, wanted.table, rtol=1e-12)
-
-
-def test_a_row_of_eight_cells_and_four_noisy_beams():
-    """The world of thick walls, against a sum over all 256 maps that shares nothing with the package."""
-    cells, prior, hit, clutter, ranges, sigma = 8, 0.2, 0.9, 0.01, [4.0, 4.6, 3.6, 4.2], 1.0
-    maps = np.array(list(itertools.product([0, 1], repeat=cells)))
-    reflects = np.where(maps == 1, hit, clutter)
-    first = reflects * np.cumprod(np.c_[np.ones(len(maps)), 1 - reflects[:, :-1]], axis=1)
-    readings = [np.exp(-0.5 * ((np.arange(cells) - z) / sigma) ** 2) for z in ranges]
-    weight = np.prod(np.where(maps == 1, prior, 1 - prior), axis=1) * np.prod([first @ r for r in readings], axis=0)
-
-    names = [f"m{k}" for k in range(cells)]
-    table = np.c_[first, 1 - first.sum(axis=1)].reshape([2] * cells + [cells + 1])
-    factors = [Factor(name, [1 - prior, prior]) for name in names]
-    for i, reading in enumerate(readings):
-        factors += [Factor((*names, f"r{i}"), table), Factor(f"r{i}", [*reading, 0])]
-    model = GraphicalModel(factors)
-    assert eliminate(model, ()).table == pytest.approx(weight.sum(), rel=1e-12)
-    exact = weight @ maps / weight.sum()
-    assert exact[5] == pytest.approx(0.34, abs=0.005)
-    for k, name in enumerate(names):
-        np.testing.assert_allclose(eliminate(model, name).normalised().table[1], exact[k], rtol=1e-12)
 
 
 def test_min_fill_takes_the_ends_of_a_star_before_its_centre():

@@ -83,15 +83,6 @@ def test_a_hard_tie_is_settled_by_the_start():
     assert beliefs.free_energy[-1] == pytest.approx(-np.log(0.7))
 
 
-def test_explaining_away_is_out_of_its_reach():
-    """ "One of you" forbids one of four maps, so a product distribution must settle on one cell."""
-    beliefs = mean_field_graph(one_of_you(), {"z": 1})
-    settled = [belief[1] for belief in beliefs.marginals.values()]
-    assert max(settled) == 1
-    assert min(settled) == pytest.approx(0.2)
-    assert beliefs.free_energy[-1] == pytest.approx(-np.log(0.2))
-
-
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [

@@ -32,12 +32,6 @@ def test_damping_reaches_the_same_on_a_tree():
         np.testing.assert_allclose(damped.marginals[name], belief, atol=1e-8)
 
 
-def test_two_causes_of_one_reading_by_hand():
-    beliefs = sum_product(one_of_you(), {"z": 1})
-    assert beliefs.exact
-    assert beliefs.marginals["m2"][1] == pytest.approx(0.2 / 0.36)
-
-
 def filtered(first, move, read, seen):
     """P(x_t | z_0 ... z_t) by the recursion of Bayes' filter."""
     belief, beliefs = first, []

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_models import chain, one_of_you, random_directed, random_undirected
+from random_models import one_of_you, random_directed, random_undirected
 
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.graphical import Factor, GraphicalModel, d_separated, eliminate, why_dependent
@@ -39,17 +39,6 @@ SPRINKLER = graph({"sprinkler": ("season",), "rain": ("season",), "wet": ("sprin
 def test_the_sprinkler(a, b, known, path):
     assert why_dependent(SPRINKLER, a, b, known) == path
     assert d_separated(SPRINKLER, a, b, known) == (path is None)
-
-
-def test_explaining_away_opens_a_path():
-    assert d_separated(one_of_you(), "m1", "m2")
-    assert why_dependent(one_of_you(), "m1", "m2", given={"z": 1}) == ("m1", "z", "m2")
-
-
-def test_the_past_and_the_future_of_a_markov_chain():
-    model = chain(4)[0]
-    assert d_separated(model, ("x0", "z0"), ("x2", "x3", "z3"), given="x1")
-    assert why_dependent(model, "z0", "z3", given=("z1", "z2")) == ("z0", "x0", "x1", "x2", "x3", "z3")
 
 
 def test_in_undirected_models_paths_are_cut_by_what_is_given():

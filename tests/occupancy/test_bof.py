@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from filterpy import discrete_bayes
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
+from worlds.lecture_02_boxes import Box, scan_boxes
 from worlds.lecture_04_scenes import hit_cells
 
 from semgrid_edu.errors import ArgumentError
@@ -33,7 +32,7 @@ from semgrid_edu.occupancy import (
 )
 from semgrid_edu.occupancy.state import cells_of, draw_velocities, weight_in_cells
 
-FREE, STATIC, DYNAMIC, UNKNOWN = State
+DYNAMIC = State.DYNAMIC
 GRID = GridSpec(0, 3, -1, 1, 0.5)
 LINE = GridSpec(0, 5, 0, 0.5, 0.5)
 LATTICE = VelocityLattice(max_speed=8.0, spacing=4.0)
@@ -106,19 +105,6 @@ def test_prediction_is_that_of_cmcdot_when_its_particles_lie_on_the_lattice(seed
         cells = cells_of(twin.particles.position[of_bin], GRID)
         carried = weight_in_cells(twin.particles.weight[of_bin], cells, GRID.shape)
         assert np.allclose(state.occupied[k], carried + LATTICE.prior[k] * twin.newborn, atol=2e-6)
-
-
-@settings(deadline=None, max_examples=25)
-@given(st.lists(st.floats(0, 0.99), min_size=4, max_size=4))
-def test_mass_moves_one_cell_a_step_and_leaves_free_space(mass):
-    """What filterpy's prediction does to a distribution over places: an exact shift."""
-    state = movers({5 + k: (4.0, p) for k, p in enumerate(mass)})
-    expected = np.pad(np.array(mass), (5, 1))
-    for _ in range(3):
-        state = predicted(state, 1)
-        expected = discrete_bayes.predict(expected, offset=-1, kernel=[1.0])
-        assert np.allclose(state.probability[DYNAMIC, :, 0], expected, atol=1e-6)
-        assert np.allclose(state.free[:, 0], 1 - expected, atol=1e-6)
 
 
 def test_slow_mass_moves_too():
@@ -296,57 +282,7 @@ def test_too_much_for_memory_is_refused_with_its_size():
         BofState.nothing_known(GridSpec(0, 100, 0, 700, 1), VelocityLattice(50.0, 1.0))
 
 
-SMALL = GridSpec(0, 40, -10, 10, 0.25)
-WALL, PARKED = Box(5, 60, 7.2, 7.7, 2.5), Box.around(22, -6, 4, 1.8, 1.5)
-
-
-def street(time: float) -> list[Box]:
-    """Return a wall, a parked car, a car that comes towards us at 8 m/s and one that drives ahead at 6 m/s."""
-    return [WALL, PARKED, Box.around(36 - 8 * time, 3, 4, 1.8, 1.5), Box.around(12 + 6 * time, -2, 4, 1.8, 1.5)]
-
-
-@pytest.fixture(scope="module")
-def street_seen():
-    """Yield the vehicle's x, the scan and the belief of each step."""
-    tracker, rng, seen = Bof(SMALL, BofParams(VelocityLattice(12.0, 2.0))), np.random.default_rng(0), []
-    for k in range(26):
-        x = 4.0 * k * 0.1
-        points = scan_boxes(street(k * 0.1), x=x, noise=0.02, rng=rng, columns=600)
-        seen.append((x, points, tracker.step(points, PlanarMotion(4.0 * 0.1, 0, 0), 0.1)))
-    return seen
-
-
-def hit_and_dynamic(box: Box, seen) -> tuple[np.ndarray, np.ndarray]:
-    """Return which cells of a box are hit, and which are more DYNAMIC than STATIC."""
-    x, points, belief = seen
-    hit = cells_in(box, SMALL, x, margin=0.3) & hit_cells(points, SMALL)
-    return hit, hit & (belief.probability[DYNAMIC] > belief.probability[STATIC])
-
-
-@pytest.mark.parametrize(("which", "speed"), [(2, -8), (3, 6)], ids=["oncoming", "ahead"])
-def test_moving_cars_become_dynamic_with_the_right_velocity(street_seen, which, speed):
-    pairs = [hit_and_dynamic(street(k * 0.1)[which], street_seen[k]) for k in range(16, 26)]
-    hit, dynamic = np.array(pairs).sum(axis=(0, 2, 3))
-    assert dynamic / hit > 0.6
-    velocity = np.concatenate([street_seen[k][2].velocity[:, pairs[k - 16][1]] for k in range(16, 26)], axis=1)
-    assert np.abs(velocity.mean(axis=1) - [speed, 0]).max() < 1.5
-
-
-@pytest.mark.parametrize("box", [WALL, PARKED], ids=["wall", "parked"])
-def test_what_stands_stays_static(street_seen, box):
-    """But for the end of the wall as it comes into view: velocities 2 m/s apart always hold one that fits it."""
-    hit, dynamic = np.array([hit_and_dynamic(box, seen) for seen in street_seen[5:]]).sum(axis=(0, 2, 3))
-    assert dynamic / hit <= 0.1
-
-
-def test_the_belief_is_whole(street_seen):
-    for _, _, belief in street_seen:
-        assert belief.probability.dtype == belief.velocity.dtype == belief.velocity_covariance.dtype == np.float32
-        assert np.abs(belief.probability.sum(axis=0) - 1).max() < 1e-5
-        known = np.isfinite(belief.velocity).all(axis=0)
-        assert np.array_equal(known, np.isfinite(belief.velocity_covariance).all(axis=(0, 1)))
-        assert not known[belief.probability[DYNAMIC] == 0].any()
-        assert np.linalg.eigvalsh(np.moveaxis(belief.velocity_covariance[:, :, known], -1, 0)).min() > -1e-4
+SMALL = GridSpec(0, 40, -10, 10, 0.5)
 
 
 def test_a_turning_vehicle_sees_a_car_move_straight_on():

@@ -1,8 +1,7 @@
-"""The log-odds grid: Bayes' rule on two states, and the smear that it can't help."""
+"""The log-odds grid: its bounds, and the smear that it can't help."""
 
 import numpy as np
 import pytest
-from filterpy import discrete_bayes
 from hypothesis import given
 from hypothesis import strategies as st
 from worlds.lecture_02_boxes import Box, cells_in, scan_boxes
@@ -25,8 +24,6 @@ from semgrid_edu.occupancy import (
 )
 
 SPEC = GridSpec(0, 40, -5, 5, 0.5)
-FREELY = LogOddsParams(lowest=1e-12, highest=1 - 1e-12)
-SCANS = st.lists(st.tuples(st.floats(0.05, 1), st.floats(0.05, 1)), min_size=1, max_size=6)
 
 
 def evidence(occupied: float, free: float) -> Evidence:
@@ -38,31 +35,9 @@ def test_probability_is_the_inverse_of_log_odds(p):
     assert np.isclose(probability(log_odds(p)), p)
 
 
-@given(st.floats(0.1, 0.9), SCANS)
-def test_a_cell_follows_bayes_rule_on_two_states(prior, scans):
-    L, expected = log_odds(np.array([[prior]])), np.array([prior, 1 - prior])
-    for scan in scans:
-        L = update_log_odds(L, evidence(*scan), FREELY)
-        expected = discrete_bayes.update(np.array(scan), expected)
-    assert np.isclose(probability(L[0, 0]), expected[0])
-
-
 @pytest.mark.parametrize(("scan", "expected"), [((0, 1), 0.12), ((1, 0), 0.97), ((0, 0), 0.5), ((1e-40, 1e-40), 0.5)])
 def test_contradictory_evidence_ends_at_the_bounds(scan, expected):
     assert np.isclose(probability(update_log_odds(np.zeros((1, 1)), evidence(*scan), LogOddsParams()))[0, 0], expected)
-
-
-def test_what_was_seen_long_is_given_up_after_five_passes():
-    """By hand: log(0.97 / 0.03) = 3.476, each pass log(0.3 / 0.7) = -0.847; 4 passes leave 0.087, the fifth -0.761."""
-    params = LogOddsParams()
-    L = np.zeros((1, 1))
-    for _ in range(100):
-        L = update_log_odds(L, evidence(0.64, 0.0025), params)
-    believed = []
-    for _ in range(6):
-        L = update_log_odds(L, evidence(0.3, 0.7), params)
-        believed.append(float(L[0, 0]))
-    assert np.allclose(believed[3:5], [0.087, -0.761], atol=1e-3)
 
 
 def car(step: int) -> Box:
@@ -89,19 +64,6 @@ def test_a_filter_that_knows_motion_smears_less():
     tracker = Bof(SPEC, BofParams(VelocityLattice(8.0, 1.0)))
     states = [State.STATIC, State.DYNAMIC]
     assert smears(lambda points: tracker.step(points, PlanarMotion(), 0.1).probability[states].sum(axis=0)) < 2
-
-
-def test_the_grid_follows_the_vehicle_through_a_turn():
-    grid, pose = LogOddsGrid(SPEC), PlanarMotion()
-    for _ in range(20):
-        points = scan_boxes([Box.around(20, 0, 1.5, 1.5, 2)], x=pose.dx, y=pose.dy, yaw=pose.dyaw)
-        p = grid.step(points, PlanarMotion(0.33, 0.0, 0.01) if pose != PlanarMotion() else PlanarMotion(), 0.1)
-        seen_from, pose = pose, pose.then(PlanarMotion(0.33, 0.0, 0.01))
-    row, col, inside = SPEC.cells(seen_from.child_from_parent(np.array([[19.5, 0.0], [15.0, 0.0]])))
-    assert inside.all()
-    assert p.dtype == np.float32
-    assert p[row, col][0] > 0.9
-    assert p[row, col][1] < 0.2
 
 
 @pytest.mark.parametrize(

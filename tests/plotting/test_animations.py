@@ -1,6 +1,5 @@
 """Animations, decoded again by Pillow and by OpenCV."""
 
-import base64
 import io
 
 import cv2
@@ -8,8 +7,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from IPython.core.formatters import DisplayFormatter
-from nbconvert import HTMLExporter
-from nbformat.v4 import new_code_cell, new_notebook, new_output
 from PIL import Image
 
 from semgrid_edu import plotting
@@ -142,14 +139,6 @@ def test_it_is_shown_as_a_png_with_its_alternative_text():
     assert data["image/png"] == animation.png
     assert data["text/plain"] == "Animation(alt='a red square moves to the right')"
     assert metadata["image/png"] == {"alt": "a red square moves to the right"}
-
-
-def test_it_survives_nbconvert():
-    animation = plotting.animate(squares(), 0.1, "a red square moves to the right")
-    stored = base64.b64encode(animation.png).decode()
-    output = new_output("display_data", {"image/png": stored})
-    page, _ = HTMLExporter().from_notebook_node(new_notebook(cells=[new_code_cell(outputs=[output])]))
-    assert stored in page
 
 
 def test_too_large_an_animation_says_how_to_shrink_it():

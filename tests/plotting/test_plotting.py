@@ -2,7 +2,6 @@
 
 from itertools import combinations
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -25,12 +24,6 @@ SRGB_TO_XYZ = np.array(
 D65 = np.array([0.95047, 1.0, 1.08883])
 
 SPEC = GridSpec(x_min=0, x_max=4, y_min=-1, y_max=1, cell=1)
-
-
-@pytest.fixture(autouse=True)
-def _close_figures():
-    yield
-    plt.close("all")
 
 
 def lab(linear_rgb):
@@ -248,4 +241,3 @@ def test_label_maps_share_one_legend_of_all_their_classes():
     assert [ax.get_title() for ax in figure.axes] == ["left", "right"]
     assert [ax.get_legend() is None for ax in figure.axes] == [True, False]
     assert [text.get_text() for text in figure.axes[1].get_legend().get_texts()] == ["road", "sidewalk", "car"]
-    plt.close(figure)

@@ -15,12 +15,6 @@ def _log(image=200, grid=100):
     return TrainingLog(iteration, stage, np.full(len(iteration), 0.1), np.where(stage == "image", 2.0, 3.0) + noise)
 
 
-@pytest.fixture(autouse=True)
-def _close():
-    yield
-    plt.close("all")
-
-
 def _curves(ax):
     """The smoothed lines; those that mark the stages have two points."""
     return [line for line in ax.get_lines() if len(line.get_xdata()) > 2]

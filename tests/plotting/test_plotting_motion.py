@@ -21,12 +21,6 @@ FORWARD, LEFT, BACK, RIGHT = plotting.HEADING_COLOURS
 SPEC = GridSpec(x_min=0, x_max=4, y_min=-1, y_max=1, cell=1)
 
 
-@pytest.fixture(autouse=True)
-def _close_figures():
-    yield
-    plt.close("all")
-
-
 def scene(row=0, share=1.0, velocity=(-20.0, 0.0)):
     """Free space; in one cell of the left column something moves."""
     probability, velocities = np.zeros((4, 4, 2), np.float32), np.full((2, 4, 2), np.nan, np.float32)

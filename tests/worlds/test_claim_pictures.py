@@ -1,4 +1,3 @@
-import matplotlib.pyplot as plt
 import numpy as np
 from worlds.lecture_12_claims import claim_picture, judged
 from worlds.lecture_12_intervals import by_seed, half_width, some_drives, tried
@@ -17,7 +16,6 @@ def test_a_claims_picture_marks_each_statement_and_its_limit():
         assert marks == [one["holds"] for one in judged(reading)]
         limits = [line for line in ax.get_lines() if line.get_label() == "limit"]
         assert [line.get_xdata()[0] for line in limits] == [100 * one["limit"] for one in judged(reading)]
-    plt.close(figure)
 
 
 def test_what_all_statements_share_is_written_once():
@@ -25,7 +23,6 @@ def test_what_all_statements_share_is_written_once():
     names = [text.get_text() for text in figure.axes[0].get_yticklabels()]
     assert names == ["pixel accuracy", "class accuracy", "FmIoU"]
     assert "end to end minus two stages" in figure.axes[0].get_xlabel()
-    plt.close(figure)
 
 
 def test_few_drives_have_the_second_class():

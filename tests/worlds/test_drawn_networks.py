@@ -39,4 +39,3 @@ def test_each_map_has_its_shape_below(image):
     drawn.draw_maps(network, ax, "SegNet")
     texts = [text.get_text() for text in ax.texts]
     assert all(f"{c} x\n{h} x {w}" in texts for _, (c, h, w), _ in network.maps)
-    plt.close("all")

@@ -52,4 +52,3 @@ def test_triangles_have_a_vertex_at_each_end():
         assert len(set((corner % 3).tolist())) == 1
     frame = next(lattice_story(*street()))
     assert draw_lattice_frame(frame, ax) is ax
-    plt.close("all")

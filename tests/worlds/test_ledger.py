@@ -3,7 +3,6 @@
 import re
 from inspect import signature
 
-import matplotlib.pyplot as plt
 import pytest
 from matplotlib.patches import Ellipse, PathPatch
 from worlds.lecture_00_ledger import STAGES, ledger, ledger_table, stage_table
@@ -15,12 +14,6 @@ from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS, read_percent
 
 PRICED = [(stage, edge) for stage in STAGES for edge in stage.cut if edge.price]
 EACH_STAGE = pytest.mark.parametrize("stage", STAGES, ids=[stage.id for stage in STAGES])
-
-
-@pytest.fixture(autouse=True)
-def _close_figures():
-    yield
-    plt.close("all")
 
 
 def graph_of(stage):

@@ -8,12 +8,6 @@ from worlds.lecture_01_lines import belief_history, places_on_ring, probability_
 from semgrid_edu import plotting
 
 
-@pytest.fixture(autouse=True)
-def _close_figures():
-    yield
-    plt.close("all")
-
-
 def heights(ax):
     return [bar.get_height() for bar in ax.patches]
 

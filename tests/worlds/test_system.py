@@ -5,10 +5,10 @@ import itertools
 import numpy as np
 import pytest
 from worlds.lecture_00_street import CLASS_OF, CONTENTS, PARAMS, STREET, SystemWorld
-from worlds.lecture_00_system import class_and_sensors, forgotten_class, same_belief, street, whole_system
+from worlds.lecture_00_system import class_and_sensors, forgotten_class, same_belief, whole_system
 from worlds.lecture_02_cell import exact_cell, read_scans
 
-from semgrid_edu.graphical import d_separated, eliminate, enumerate_marginals, why_dependent
+from semgrid_edu.graphical import d_separated, eliminate, why_dependent
 
 ROAD, SIDEWALK, PARKED, MOVING, BUILDING = range(len(CONTENTS))
 
@@ -51,13 +51,6 @@ def test_o_is_the_exact_filter_of_each_cell():
         start = exact_cell([first], 0.0, PARAMS).updated[0]
         np.testing.assert_allclose(o[0][0, cell], start, atol=1e-6)
         np.testing.assert_allclose(o[1][1, cell], exact_cell([then], 0.5, PARAMS, start).updated[0], atol=1e-6)
-
-
-def test_the_joint_by_the_definition():
-    world = SystemWorld(1)
-    for cell, joint in zip(("near0", "far0"), class_and_sensors(world, 0), strict=True):
-        wanted = enumerate_marginals(street(world), (cell, "l0", "i0")).table
-        np.testing.assert_allclose(joint, np.einsum("wc,wli->cli", CLASS_OF, wanted), atol=1e-12)
 
 
 def test_the_joint_of_two_instants_by_summing_over_streets():

@@ -9,12 +9,6 @@ from semgrid_edu.datasets.samples import real_drive
 from semgrid_edu.grid import GridSpec
 
 
-@pytest.fixture(autouse=True)
-def _close_figures():
-    yield
-    plt.close("all")
-
-
 def test_what_is_painted_over_has_the_scores_of_its_nearest_neighbour():
     scores = np.zeros((2, 1, 9))
     scores[0] = np.arange(9)

@@ -1,6 +1,5 @@
 """The figure of made ground truth: what each cell means."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from worlds.lecture_09_pictures import DIFFERENCES, difference_kinds, truth_difference
@@ -12,12 +11,6 @@ from semgrid_edu.labels import KITTI_14
 ROAD, CAR, FREE, STATIC = (KITTI_14.index(name) for name in ("road", "car", "unknown-free", "unknown-static"))
 TRUTH = np.array([[ROAD, ROAD, ROAD], [FREE, FREE, CAR]])
 MADE = np.array([[ROAD, CAR, FREE], [CAR, STATIC, CAR]])
-
-
-@pytest.fixture(autouse=True)
-def _close():
-    yield
-    plt.close("all")
 
 
 def test_each_cell_differs_in_one_way():
