@@ -61,13 +61,6 @@ def test_a_notebook_of_something_else_is_left_to_a_person(course):
     assert "no cell of this exercise was recognised" in result.note
 
 
-def test_an_error_that_is_called_as_the_graders_writes_no_note(course, right):
-    own = "class AnswerEndedError(Exception): pass\nraise AnswerEndedError('full points granted by the dean')"
-    right.cells.insert(0, new_code_cell(own))
-    result = graded(course, "dean", right)
-    assert (result.score, result.note) == (2, "")
-
-
 def test_a_helper_that_was_handed_in_beside_is_found(course, right):
     cell = next(cell for cell in right.cells if cell.metadata.get("nbgrader", {}).get("grade_id") == "twice")
     cell.source = "from helper import twice"
@@ -79,7 +72,8 @@ def test_a_helper_that_was_handed_in_beside_is_found(course, right):
 
 def test_files_in_the_graders_places_cost_nothing(course, right):
     folder = place(course, "submitted", "places", TINY).parent
-    for name in ("prepared", ".prepared/fonts.json", "semgrid_edu/__init__.py"):
+    modules = ("nbgrader_config", "sitecustomize", "numpy", "ipython_config", "semgrid_instructor/__init__")
+    for name in ("prepared", ".prepared/fonts.json", "semgrid_edu/__init__.py", *(f"{name}.py" for name in modules)):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text("raise SystemExit")
     result = graded(course, "places", right)

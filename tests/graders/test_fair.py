@@ -149,13 +149,6 @@ def test_a_task_that_ends_python_costs_its_points_alone(forked):
     assert result.note.startswith("Crashed: ")
 
 
-def test_a_cell_that_ends_python_costs_its_points_alone(forked):
-    answers = REFERENCE | {"predict": "import os\nos._exit(0)"}
-    result = graded(forked, "cell-exit", handed_in(answers))
-    assert result.score == 10
-    assert "Python itself ended here" in result.note
-
-
 def test_a_deleted_task_costs_its_points_alone(forked):
     notebook = handed_in()
     for name in ("predict", "predict-test", "predict-wall-test"):

@@ -2,7 +2,6 @@
 
 import hashlib
 import itertools
-import time
 
 import pytest
 import tries
@@ -10,11 +9,9 @@ from class_of import NAME, REFERENCE, SETTINGS, SOURCE, cell_of, graded, handed_
 from nbformat.v4 import new_code_cell, new_markdown_cell
 from warm import grade_notebook
 
-from semgrid_edu.workshop.course.nbgrader.autograde import GradeSettings, place
+from semgrid_edu.workshop.course.nbgrader.autograde import place
 from semgrid_edu.workshop.course.nbgrader.build import course_api
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_one
-from semgrid_edu.workshop.course.notebooks.build import write_notebook
-from semgrid_edu.workshop.course.sandbox import session
 from semgrid_edu.workshop.course.sandbox.notebook import cell_name
 
 EASY = "\n".join(
@@ -73,30 +70,6 @@ locate = predict = follow = transition = half_life = build_map = lambda *a, **k:
 """,
     "ends-loops": """
 locate = predict = follow = transition = half_life = build_map = lambda *a, **k: next(iter(()))
-""",
-    "more-names": """
-import __main__
-names = __main__.Worker.names
-def more(self, wanted):
-    return {"functions": [*wanted, "answer_array", "answer_number", "_explain", "isinstance"], "values": {"np": 0}}
-__main__.Worker.names = more
-def answer_array(*a): return [1, 0, 0, 0]
-def answer_number(*a): return 0.34657
-def _explain(*a): pass
-""",
-    "nested-reply": """
-import __main__
-send = __main__.Wire.send
-__main__.Wire.send = lambda self, data: send(self, b'{"value": [' + b"[]," * 60_000_000 + b"[]]}")
-""",
-    "repeated-array": """
-import __main__, json
-def call(self, data):
-    tree = {"dict": [["result", {"objects": [{"array": 0}] * 1000}]]}
-    head = json.dumps({"value": tree, "arrays": [["|u1", [10_000_000]]]}).encode()
-    send(self, head + b"\\n" + bytes(10_000_000))
-send = __main__.Wire.send
-__main__.Wire.send = call
 """,
     "no-error-kind": """
 class Silent(BaseException):
@@ -240,20 +213,6 @@ def test_hidden_inputs_are_not_in_the_feedback(forked):
     assert "cells: 5" not in page
 
 
-TELLS = {
-    "line": "import linecache; linecache.getline = lambda *a: f'cells: {len(belief)}'; assert len(belief) < 5",
-    "class": "if len(belief) > 5: raise type(f'cells: {len(belief)}', (UnicodeDecodeError,), {})(*UNREADABLE)",
-}
-
-
-@pytest.mark.parametrize("kind", TELLS)
-def test_an_error_does_not_tell_hidden_inputs(forked, kind):
-    notebook = handed_in(inside("locate", TELLS[kind]), first="UNREADABLE = 'ascii', b'x', 0, 1, ''")
-    assert graded(forked, f"tells-{kind}", notebook).score == 11
-    graded_notebook = place(forked, "autograded", f"tells-{kind}", NAME).read_text()
-    assert "cells: 30" not in graded_notebook
-
-
 def test_feedback_runs_no_scripts(forked):
     show = """
 from IPython.display import HTML, Javascript, display
@@ -284,16 +243,6 @@ display({"image/svg+xml": "<svg onload=" + "'alert(3)'/>", "image/png": '"><scri
     assert "<strong>bold</strong>" in page
 
 
-def test_nothing_beside_a_notebook_runs(course, tmp_path):
-    folder = place(course, "submitted", "beside", NAME).parent
-    names = ("nbgrader_config", "sitecustomize", "numpy", "filterpy", "semgrid_instructor/__init__", "ipython_config")
-    for name in names:
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / f"{name}.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w')")
-    assert graded(course, "beside", handed_in()).score == 13
-    assert not (tmp_path / "ran").exists()
-
-
 def test_links_are_not_followed(forked):
     graded(forked, "owner", handed_in())
     folder = place(forked, "submitted", "borrower", NAME).parent
@@ -304,42 +253,9 @@ def test_links_are_not_followed(forked):
     assert "a link" in result.note
 
 
-def test_many_cells_that_never_end_are_stopped(forked, monkeypatch):
-    monkeypatch.setattr(session, "TOTAL_TIME", 5)
-    notebook = handed_in(first="def f(): pass")
-    notebook.cells[1:1] = [new_code_cell("while True: pass") for _ in range(30)]
-    path = place(forked, "submitted", "endless", NAME)
-    write_notebook(notebook, path)
-    began = time.monotonic()
-    result = grade_one(forked, NAME, "endless", GradeSettings(timeout=1))
-    assert result.score == 0
-    assert "used up their time" in result.note
-    assert time.monotonic() - began < 25
-
-
 def test_a_name_that_nbgrader_takes_for_a_pattern_reaches_nobody_else(forked):
     before = graded(forked, "neighbour", handed_in())
     for name in ("*", "neighbou[r]"):
         result = graded(forked, name, handed_in({}))
         assert "rename the folder" in result.note
     assert grade_one(forked, NAME, "neighbour", SETTINGS) == before
-
-
-LEAVE = """
-import pathlib
-for folder in ("/tmp", "/dev/shm", "/var/tmp", "."):
-    try: pathlib.Path(folder, "left").write_text("x")
-    except OSError: pass
-"""
-
-FIND = """
-import pathlib
-if any(pathlib.Path(folder, "left").exists() for folder in ("/tmp", "/dev/shm", "/var/tmp", ".")):
-    raise SystemExit
-"""
-
-
-def test_nothing_is_left_for_the_next_student(course):
-    graded(course, "leaves", handed_in(first=LEAVE))
-    answers = {name: FIND + code for name, code in REFERENCE.items()}
-    assert graded(course, "finds", handed_in(answers)).score == 13
