@@ -1,20 +1,13 @@
 """The `semgrid-edu course` commands say what they did, and what they could not do."""
 
-import pytest
 from tiny_course import tiny_notebooks
 from typer.testing import CliRunner
 
-from semgrid_edu.errors import ArgumentError
 from semgrid_edu.workshop.commands import course as course_commands
 from semgrid_edu.workshop.commands import main as cli
 from semgrid_edu.workshop.course.nbgrader import grade_class as grade
 from semgrid_edu.workshop.course.nbgrader.build import build_course
 from semgrid_edu.workshop.course.sandbox.limits import PARTS
-
-
-def test_unknown_lecture_is_refused():
-    with pytest.raises(ArgumentError, match="99_nothing"):
-        CliRunner().invoke(cli.app, ["course", "notebooks", "99_nothing"], catch_exceptions=False)
 
 
 def test_missing_tools_are_named(monkeypatch):

@@ -90,15 +90,6 @@ def test_notebook_that_nbgrader_cannot_read_is_an_error_not_a_zero(course):
         autograde_one(course, "00_tiny", "breaker", GradeSettings())
 
 
-def test_nothing_is_written_to_other_peoples_folders(tmp_path, notebooks):
-    (tmp_path / "thesis.txt").write_text("mine")
-    with pytest.raises(DataError, match=r"an empty folder, or a course"):
-        build_course(tmp_path, notebooks)
-    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
-    with pytest.raises(DataError, match=r"thesis\.txt: expected a folder"):
-        build_course(tmp_path / "thesis.txt", notebooks)
-
-
 def test_a_broken_source_is_named(tmp_path):
     notebooks = tiny_notebooks(tmp_path / "notebooks")
     broken = notebooks / "src" / "exercises" / "00_tiny.py"

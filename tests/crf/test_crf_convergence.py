@@ -1,7 +1,5 @@
 """Mean field never raises the free energy, and where it stops (eq. (3), (4))."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from enumeration import enumerated
@@ -11,7 +9,6 @@ from semgrid_edu import fast
 from semgrid_edu.crf import (
     CrfParams,
     crf_model,
-    damping,
     free_energy,
     gram_matrix,
     log_partition,
@@ -76,20 +73,6 @@ def test_the_kernels_have_no_negative_eigenvalue_which_is_what_the_damping_rests
         np.testing.assert_allclose(pair_weights(values, params), gram, atol=1e-12, err_msg=f"seed {seed}")
 
 
-def test_two_cells_that_would_swap_their_labels_for_ever_agree_or_stay():
-    """A pair weight of 20 against a unary of 1: undamped, Q jumps to and fro, and the free energy with it."""
-    unary, values = np.array([[[0.0, 1.0]], [[1.0, 0.0]]]), np.full((4, 1, 2), 0.25)
-    params = CrfParams(w_bilateral=10, w_spatial=10, normalization="none")
-    weights, Q, undamped = pair_weights(values, params), softmax(-unary.reshape(2, 2), axis=0), []
-    for _ in range(6):
-        Q = softmax(-unary.reshape(2, 2) - (1 - Q) @ weights, axis=0)
-        undamped.append(Q.reshape(unary.shape))
-    assert all((a.argmax(axis=0) != b.argmax(axis=0)).all() for a, b in pairwise(undamped))
-    found = energies(unary, values, params, 30)
-    assert (np.diff(found) <= ROUNDING).all()
-    assert found[-1] < min(free_energy(Q, unary, values, params) for Q in undamped) - 1
-
-
 def test_all_at_once_ends_in_a_fixed_point_of_one_by_one():
     params = CrfParams(w_bilateral=2, w_spatial=2)
     for seed in range(20):
@@ -129,10 +112,6 @@ def test_an_update_by_filters_follows_the_naive_one_into_strong_coupling(infer):
         params = CrfParams(w_bilateral=0, w_spatial=rng.choice([3, 30]), sigma_gamma=2, normalization="none")
         exact = mean_field_naive(unary, values, params)
         np.testing.assert_allclose(infer(unary, values, params), exact, atol=2e-3, err_msg=f"seed {seed}")
-
-
-def test_damping_by_hand():
-    np.testing.assert_allclose(damping(np.array([0.0, 2.0, 6.0])), [1, 1 / 2, 1 / 4])
 
 
 @pytest.mark.parametrize("infer", [mean_field_naive, mean_field, fast.mean_field])

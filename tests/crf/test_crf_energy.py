@@ -8,7 +8,6 @@ from semgrid_edu.crf import (
     CrfParams,
     energy,
     mean_field_naive,
-    pair_weights,
     unary_from_probability,
 )
 from semgrid_edu.errors import ArgumentError
@@ -37,14 +36,6 @@ def test_energy_of_two_by_two_by_hand():
     }
     for labels, expected in cases.items():
         assert energy(np.array(labels), unary, values, AS_PRINTED) == pytest.approx(expected, abs=1e-12)
-
-
-def test_symmetric_normalisation_by_hand():
-    # Two cells, k = exp(-1/2) between them: D = 1 + k, so the pair weighs w k / (1 + k).
-    values = np.full((4, 1, 2), 0.25)
-    params = CrfParams(w_bilateral=0, w_spatial=3, sigma_gamma=1)
-    k = np.exp(-0.5)
-    np.testing.assert_allclose(pair_weights(values, params), 3 * k / (1 + k) * np.array([[0, 1], [1, 0]]))
 
 
 def test_one_update_written_as_eq_4_with_loops():

@@ -22,6 +22,7 @@ from semgrid_edu.errors import DataError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14, LabelSet
+from semgrid_edu.metrics import METRICS, confusion_matrix
 from semgrid_edu.networks import Architecture, build_net, load_net, save_net
 from semgrid_edu.pipeline import STAGES, run_pipeline
 from semgrid_edu.plotting import depth_colours
@@ -149,7 +150,7 @@ def test_nothing_else_is_written(out):
     assert {path.name for path in out.iterdir()} == {"index.html", "overview.png"}
 
 
-def test_metrics_equal_those_counted_by_hand(results, html):
+def test_metrics_are_those_of_the_results(results, html):
     truths, guesses = [], {"network": [], "network + CRF": []}
     for result in results[1:]:
         truths.append(grid_truth(result.frame.labels, result.belief.probability, GridSpec.compact()).ravel())
@@ -160,13 +161,8 @@ def test_metrics_equal_those_counted_by_hand(results, html):
         guess = np.concatenate(parts)
         for cells, kept in (("all cells", truth >= 0), ("semantic cells", truth < 10)):
             found = scores_in(html, f"{cells}, {name}")
-            classes = np.unique(truth[kept])
-            hits = (truth == guess) & kept
-            recall = [hits[truth == c].sum() / (truth == c).sum() for c in classes]
-            union = [(kept & ((truth == c) | (guess == c))).sum() for c in classes]
-            share = [(truth == c).sum() / kept.sum() for c in classes]
-            iou = sum(s * hits[truth == c].sum() / u for s, c, u in zip(share, classes, union, strict=True))
-            expected = [100 * hits.sum() / kept.sum(), 100 * np.mean(recall), 100 * iou]
+            matrix = confusion_matrix(truth[kept], guess[kept], 14)
+            expected = [100 * metric(matrix) for metric in METRICS.values()]
             np.testing.assert_allclose(found, expected, atol=0.051)
 
 
@@ -373,8 +369,10 @@ class TestMistakes:
     def test_a_later_frame_that_cannot_be_read_ends_the_page(self, weights, tmp_path):
         folder = write_tiny_drive(tmp_path)
         (folder / "velodyne_points" / "data" / "0000000002.bin").write_bytes(b"\0" * 7)
-        with pytest.raises(DataError, match=r"0000000002\.bin.*index.html shows the frames before it"):
-            write_demo(KittiRawDrive(tmp_path, DATE, "0001"), weights, tmp_path / "out")
+        drive, saved = KittiRawDrive(tmp_path, DATE, "0001"), tmp_path / "saved"
+        with pytest.raises(DataError, match=r"0000000002\.bin.*index.html shows the frames before it, as .*saved does"):
+            write_demo(drive, weights, tmp_path / "out", save=saved)
+        assert np.load(saved / "frames.npz")["frame"].tolist() == [0, 1]
         html = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
         assert len(json.loads(Page(html).text["frames"])) == 2
         assert "could not be read to its end" in html
@@ -384,9 +382,10 @@ class TestMistakes:
         folder = write_tiny_drive(tmp_path, n_frames=5)
         (folder / "velodyne_points" / "data" / "0000000000.bin").write_bytes(b"\0")
         (folder / "image_02" / "data" / "0000000003.png").write_bytes(b"no image")
-        told = []
-        out = tmp_path / "out"
-        html = write_demo(KittiRawDrive(tmp_path, DATE, "0001"), weights, out, skipped=told.append).read_text("utf-8")
+        told, out, saved = [], tmp_path / "out", tmp_path / "saved"
+        drive = KittiRawDrive(tmp_path, DATE, "0001")
+        html = write_demo(drive, weights, out, skipped=told.append, save=saved).read_text("utf-8")
+        assert np.load(saved / "frames.npz")["frame"].tolist() == [1, 2, 4]
         shown = [frame["clock"] for frame in json.loads(Page(html).text["frames"])]
         assert shown == ["frame 1, 0.1 s", "frame 2, 0.2 s", "frame 4, 0.4 s"]
         assert [line.partition(": ")[0] for line in told] == ["frame 0", "frame 3"]

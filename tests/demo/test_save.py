@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
-from tiny_drive import DATE, write_tiny_drive
 
-from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.errors import ArgumentError, DataError, MissingExtraError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
@@ -248,24 +246,6 @@ class TestDemo:
             for k, result in enumerate(told):
                 np.testing.assert_allclose(saved["occupancy"][k], result.belief.probability, atol=5e-4)
                 np.testing.assert_array_equal(saved["remembered"][k], result.remembered.argmax(axis=0))
-
-    def test_numbers_the_frames_that_are_not_left_out(self, trained, tmp_path):
-        folder = write_tiny_drive(tmp_path, n_frames=4)
-        (folder / "velodyne_points" / "data" / "0000000000.bin").write_bytes(b"\0")
-        (folder / "image_02" / "data" / "0000000002.png").write_bytes(b"no image")
-        drive = KittiRawDrive(tmp_path, DATE, "0001")
-        write_demo(drive, trained, tmp_path / "page", skipped=print, save=tmp_path / "saved")
-        with np.load(tmp_path / "saved" / "frames.npz") as saved:
-            assert saved["frame"].tolist() == [1, 3]
-
-    def test_holds_the_frames_before_a_damaged_one_and_the_error_says_so(self, trained, tmp_path):
-        folder = write_tiny_drive(tmp_path)
-        (folder / "velodyne_points" / "data" / "0000000002.bin").write_bytes(b"\0" * 7)
-        drive = KittiRawDrive(tmp_path, DATE, "0001")
-        with pytest.raises(DataError, match=r"0000000002\.bin.*index.html shows the frames before it, as .*saved does"):
-            write_demo(drive, trained, tmp_path / "page", save=tmp_path / "saved")
-        with np.load(tmp_path / "saved" / "frames.npz") as saved:
-            assert saved["frame"].tolist() == [0, 1]
 
     @pytest.mark.parametrize(
         ("options", "error", "message"),

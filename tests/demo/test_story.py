@@ -7,7 +7,6 @@ import pytest
 import torch
 from scipy.special import softmax
 from tiny_drive import STEP
-from torch import nn
 
 from semgrid_edu.crf import CrfParams, damping, gram_matrix, mean_field_naive, pair_weights, unary_from_probability
 from semgrid_edu.datasets.grid_truth import grid_truth
@@ -98,22 +97,6 @@ class TestContributions:
         assert why.score == pytest.approx(np.log(label / rival), abs=1e-3)
         assert why.planes.sum() + why.occupancy.sum() + why.rest == pytest.approx(why.score, abs=1e-4)
         assert why.classes.sum() == pytest.approx(why.planes.sum(), abs=1e-4)
-
-    def test_the_rest_is_the_part_of_the_biases_and_of_the_shifts_of_the_normalisations(self, stories, told, net):
-        story = stories[0]
-        scores = torch.tensor(told[-1].scores)[None]
-        o = torch.tensor(told[-1].belief.probability)[None]
-        logits = net.fusion(net.sampler(scores), o)[0, :, *story.cell]
-        constants = []
-        for module in net.fusion.modules():
-            if isinstance(module, nn.BatchNorm2d | nn.BatchNorm3d):
-                scale = module.weight / (module.running_var + module.eps).sqrt()
-                constants.append((module.bias, module.bias - scale * module.running_mean))
-            elif getattr(module, "bias", None) is not None:
-                constants.append((module.bias, module.bias))
-        gradients = torch.autograd.grad(logits[story.label] - logits[story.rival], [bias for bias, _ in constants])
-        part = sum((g * constant).sum().item() for g, (_, constant) in zip(gradients, constants, strict=True))
-        assert story.why.rest == pytest.approx(part, rel=1e-3, abs=1e-3)
 
     @pytest.mark.parametrize("changes", [{"uses_occupancy": False}, {"reduces": False}])
     def test_of_other_architectures(self, last_labelled, told, make_net, changes):

@@ -108,18 +108,6 @@ def test_velocity_and_its_covariance_are_known_where_dynamic_mass_is(street_at_e
     assert covariance[known].max() > 1
 
 
-def test_walking_people_become_dynamic():
-    spec, rng = GridSpec(0, 20, -6, 6, 0.2), np.random.default_rng(0)
-    tracker = Cmcdot(spec, seed=0)
-    for k in range(25):
-        person = Box.around(10, -3 + 1.4 * k * 0.1, 0.5, 0.5, 1.75)
-        points = scan_boxes([person], noise=0.02, rng=rng)
-        belief = tracker.step(points, STILL, 0.1)
-    cells = cells_in(person, spec, margin=0.1) & hit_cells(points, spec)
-    assert (belief.probability[State.DYNAMIC] > belief.probability[State.STATIC])[cells].mean() >= 0.6
-    assert abs(np.nanmean(belief.velocity[1, cells]) - 1.4) < 0.7
-
-
 def test_a_mirrored_world_is_believed_mirrored():
     """Except for cells whose centre lies on the border of two beams; no return lies there."""
     points = scan_boxes(street(0.0), columns=360)

@@ -126,29 +126,6 @@ def test_no_time_no_change():
     assert not predicted.newborn.any()
 
 
-def one_mover(ahead: list[float]) -> FilterState:
-    """Predict two cells in a row: a certain mover in the first, 10 m/s forward; `ahead` is the belief of the second."""
-    spec, probability = GridSpec(0, 2, 0, 1, 1), np.zeros((4, 2, 1), np.float32)
-    probability[:, 0, 0], probability[State.DYNAMIC, 1, 0] = ahead, 1
-    mover = Particles(np.array([[0.5, 0.5]], np.float32), np.array([[10, 0]], np.float32), np.ones(1, np.float32))
-    still = ((0.0,) * 4,) * 4
-    params = replace(PARAMS, rates=still, stop_rate=0.0, max_acceleration=0.0)
-    return predict(FilterState(probability, mover, np.zeros((2, 1))), spec, params, 0.1, np.random.default_rng(0))
-
-
-def test_what_arrives_in_free_space_is_dynamic_and_leaves_free_space():
-    predicted = one_mover([1, 0, 0, 0])
-    assert predicted.probability[State.DYNAMIC, 0, 0] > 0.99
-    assert predicted.probability[State.FREE, 1, 0] == 1
-
-
-def test_a_standing_wall_is_not_talked_out_of_it():
-    """Arrival a = 0.999 against static s: by hand, a (1 - s) / (1 - a s)."""
-    predicted = one_mover([0.0001, 0.9999, 0, 0])
-    assert np.isclose(predicted.probability[State.DYNAMIC, 0, 0], 0.999 * 0.0001 / (1 - 0.999 * 0.9999), rtol=1e-2)
-    assert predicted.probability[State.STATIC, 0, 0] > 0.9
-
-
 def test_what_was_all_but_impossible_is_certain_when_it_alone_explains_the_scan():
     probability = np.zeros((4, 1, 1), np.float32)
     probability[:, 0, 0] = [1, 0, 1e-40, 0]

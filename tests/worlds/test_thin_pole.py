@@ -44,13 +44,6 @@ def test_where_the_pole_ends_up_and_how_wide(mechanism, width, column):
     assert brightest.mean() == (9.5 if mechanism == "nearest" else column)
 
 
-def test_two_kernels_make_a_pyramid():
-    """(1, 2, 1)/4 and, with holes, (1, 0, 2, 0, 1)/4 one after the other."""
-    expected = np.zeros(24)
-    expected[6:13] = np.array([1, 2, 3, 4, 3, 2, 1]) / 16
-    np.testing.assert_allclose(apply_mechanism(_pole(9), "atrous")[8], expected)
-
-
 def test_indices_leave_fifteen_pixels_of_sixteen_empty():
     """Each window's maximum is where it was, and nothing else is: a pole becomes a dotted line."""
     image = np.random.default_rng(0).random((16, 24))
