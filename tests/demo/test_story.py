@@ -8,7 +8,7 @@ import torch
 from scipy.special import softmax
 from tiny_drive import STEP
 
-from semgrid_edu.crf import CrfParams, damping, gram_matrix, mean_field_naive, pair_weights, unary_from_probability
+from semgrid_edu.crf import CrfParams, pair_weights
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.fast import track_drive, with_fast_sampler
@@ -156,14 +156,6 @@ class TestNeighbours:
             best = np.argsort(-terms, kind="stable")[:5]
             np.testing.assert_allclose(found.pull[:, *cell], terms[best], rtol=1e-6)
             np.testing.assert_array_equal(found.steps[:, :, *cell].T + cell, np.argwhere(label >= 0)[best])
-
-    def test_explain_an_update_of_the_naive_mean_field(self):
-        params = CrfParams(sigma_alpha=3.2, sigma_gamma=1.2)
-        refined = mean_field_naive(unary_from_probability(self.G), self.STATES, params, iterations=1)
-        messages = neighbour_pull(self.G, self.G.argmax(axis=0), self.STATES, params).messages[:, 7, 5]
-        part = damping(gram_matrix(self.STATES, params)[7 * 11 + 5, 7 * 11 + 5])
-        updated = softmax(np.log(self.G[:, 7, 5]) + part * messages)  # from the unary term itself: nothing to undo
-        np.testing.assert_allclose(updated, refined[:, 7, 5], atol=1e-6)
 
     def test_explain_the_fast_crf_too(self, story):
         """Of the last update of a cell: all but how far it goes, which is nearly all the way."""

@@ -14,7 +14,6 @@ from warm import grade_warm
 from semgrid_edu.workshop.commands.main import app
 from semgrid_edu.workshop.course.nbgrader import build
 from semgrid_edu.workshop.course.nbgrader.autograde import place
-from semgrid_edu.workshop.course.nbgrader.build import course_api
 from semgrid_edu.workshop.course.nbgrader.grade_class import grade_course
 from semgrid_edu.workshop.course.nbgrader.gradebook import write_graded
 from semgrid_edu.workshop.course.notebooks.build import write_notebook
@@ -76,14 +75,6 @@ def test_a_warm_session_gives_the_same_points_and_messages(graded, start):
         warm = grade_warm(SOURCE, ANSWERS[student], start, PATIENT.timeout)
         assert scores(course, NAME, student) == warm, student
     assert 0 < SCORES["wrong-0"] < 13
-
-
-def test_who_earns_little_gets_feedback(graded):
-    course, _ = graded
-    with course_api(course) as api:
-        assert api.generate_feedback(NAME, "unlucky-exit")["success"]
-    page = place(course, "feedback", "unlucky-exit", NAME).with_suffix(".html").read_text()
-    assert "10.0 / 15.0" in page
 
 
 def test_what_is_graded_is_not_graded_again_unless_it_is_handed_in_again(graded):

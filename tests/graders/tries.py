@@ -2,8 +2,8 @@
 """What students may hand in that nobody asked for, to replace exercise 01's answers or surround them.
 
 `RETURNED` is code that defines `attack`, a function to replace any answer; `IN_THE_WAY` runs before all answers, each
-of which returns 0; `STOPS` is a line at the start of an answer, which costs that task alone. `WRAPPED` gives the
-right result `x` in another form; `UNUSUAL` are cells that may fail.
+of which returns 0; `STOPS` is a line at the start of an answer, which costs that task alone. `UNUSUAL` are cells that
+may fail.
 """
 
 RETURNED = {
@@ -130,35 +130,6 @@ STOPS = {
     "no streams": "import sys; sys.stdout = sys.stderr = sys.__stdout__ = None; print(1); return 0",
 }
 
-WRAPPED = {
-    "float32, backwards": "np.asarray(x, np.float32)[::-1][::-1] if np.ndim(x) else np.float32(x)",
-    "columns first": "np.asfortranarray(x)",
-    "big-endian": "np.asarray(x, '>f8')",
-    "long double": "np.asarray(x, np.longdouble)",
-    "mapped": "mapped(x)",
-    "masked, nothing hidden": "np.ma.array(x)",
-    "subclass": "np.asarray(x).view(type('Mine', (np.ndarray,), {}))",
-    "tuples": "tuple(np.asarray(x).tolist()) if np.ndim(x) else float(x)",
-    "read-only": "read_only(x)",
-    "of objects": "np.asarray(x, dtype=object)",
-    "tensor": "__import__('torch').as_tensor(np.asarray(x))",
-    "named": "__import__('collections').namedtuple('Rows', [f'r{k}' for k in range(len(x))])(*x) if np.ndim(x) else x",
-}
-
-WRAPPING = """
-def mapped(x):
-    array = np.memmap(f"{abs(hash(str(x)))}.dat", "f8", "w+", shape=np.shape(x) or (1,))
-    array[...] = x
-    return array if np.ndim(x) else float(array[0])
-
-def read_only(x):
-    array = np.array(x)
-    array.setflags(write=False)
-    return array
-
-def wrapped(f, change):
-    return lambda *a, **k: change(f(*a, **k))
-"""
 
 UNUSUAL = (
     "from __future__ import annotations\nimport typing",

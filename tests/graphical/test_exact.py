@@ -148,14 +148,6 @@ def test_a_hundred_factors_around_one_variable_neither_vanish_nor_overflow(entry
         eliminate(star, "x")
 
 
-@settings(max_examples=20, deadline=None)
-@given(MODELS, SEEDS)
-def test_the_logarithm_of_an_ordinary_total(make, seed):
-    model = make(seed)
-    known, _ = some_evidence(model, seed)
-    assert log_total(model, known) == pytest.approx(np.log(eliminate(model, (), known).table))
-
-
 def test_the_logarithm_of_the_impossible():
     assert log_total(one_of_you(), {"m2": 1, "z": 0}) == -np.inf
 

@@ -20,13 +20,6 @@ def test_the_lowest_and_the_highest_return_of_a_cell():
     assert np.isfinite(lowest).sum() == np.isfinite(highest).sum() == 2
 
 
-def test_the_returns_of_the_vehicle_itself_are_left_out():
-    points = np.array([(3.5, 0.5, 0.2, 0.9, 0), (3.5, 0.5, 1.4, 0.9, 1), (1.5, 0.5, 0.7, 0.9, 1)])
-    lowest, highest = cell_heights(points, SPEC)
-    assert lowest[8, 0] == highest[8, 0] == 0.2
-    assert np.isnan(lowest).sum() == lowest.size - 1
-
-
 def test_heights_above_ground_are_above_the_lowest_return_within_four_cells():
     """A wall from 0.5 to 2 m, ground at -0.25 m four cells away; another return at 7 m sees neither."""
     heights = torch.full((2, 12, 2), torch.nan)

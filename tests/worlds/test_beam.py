@@ -45,10 +45,6 @@ def exact_by_hand(world, ranges):
     return table / table.sum()
 
 
-def known_ranges(world, ranges):
-    return {f"z{b}": range_state(world, z) for b, z in enumerate(ranges, start=1)}
-
-
 def test_cells_depend_on_each_other_once_the_range_is_known():
     model = beam_over_cells(BeamWorld(n_cells=4)).model
     assert d_separated(model, "m1", "m4")
@@ -58,7 +54,8 @@ def test_cells_depend_on_each_other_once_the_range_is_known():
 
 def test_the_graph_of_four_beams_is_the_sum_over_maps():
     world = BeamWorld()
-    found = eliminate(beam_over_cells(world, 4).model, world.cells, known_ranges(world, COARSE)).normalised()
+    known = {f"z{b}": range_state(world, z) for b, z in enumerate(COARSE, start=1)}
+    found = eliminate(beam_over_cells(world, 4).model, world.cells, known).normalised()
     np.testing.assert_allclose(found.table, exact_by_hand(world, COARSE), atol=1e-9)
 
 

@@ -18,13 +18,12 @@ from worlds.lecture_04_crossing import (
     measure_arrivals,
     measure_drives_away,
     measure_luck,
-    on_a_line,
     street,
 )
 
 from semgrid_edu.datasets.samples import real_drive
 from semgrid_edu.fast import SensorModel, track_drive
-from semgrid_edu.occupancy import CmcdotParams, State
+from semgrid_edu.occupancy import CmcdotParams
 
 
 def test_the_table_of_seeds_is_what_a_run_measures():
@@ -32,20 +31,6 @@ def test_the_table_of_seeds_is_what_a_run_measures():
     for name, (scene, thing) in ONE_CHANGE.items():
         measured = measure_luck(3000, range(2), scene)[:, thing - CAR]
         np.testing.assert_allclose(measured.mean(), luck_of_one_change()[name][:2].mean(), atol=12, err_msg=name)
-
-
-def test_the_mean_over_seeds_rises_with_the_number_of_particles_and_the_scatter_falls():
-    shares = np.array(list(luck().values()))  # numbers, seeds, car and person
-    assert shares.shape == (3, 24, 2)
-    assert (np.diff(shares.mean(axis=1), axis=0) > 5).all()
-    assert (np.diff(shares.std(axis=1), axis=0) < 0).all()
-
-
-def test_the_line_holds_what_its_particles_carry():
-    line, _, state = on_a_line(np.array([1.2, 1.8]), np.array([10, 0]), np.array([0.2, 0.3]), fence=4)
-    assert line.shape == (6, 1)
-    np.testing.assert_allclose(state.probability[State.DYNAMIC, ::-1, 0], [0, 0.5, 0, 0, 0, 0])
-    np.testing.assert_allclose(state.probability.sum(axis=0), 1)
 
 
 def test_a_coming_car_becomes_dynamic():

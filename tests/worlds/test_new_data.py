@@ -7,11 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from worlds.lecture_13_checks import (
-    AXES,
     axes_errors,
     ground_plane,
     overlay_error,
-    sensor_delays,
     share_on_image,
     time_gaps,
     wall_lean,
@@ -55,14 +53,6 @@ def test_gaps_by_hand_and_times_that_run_backwards():
     for bad in ([1.0], [0.0, 0.2, 0.1]):
         with pytest.raises(ArgumentError, match="times"):
             time_gaps(bad)
-
-
-def test_a_simulated_drive_has_one_clock():
-    assert {name: late.max() for name, late in sensor_delays(sample_drive()).items()} == {
-        "image_02": 0,
-        "oxts": 0,
-        "velodyne_points": 0,
-    }
 
 
 def test_share_of_returns_on_the_image_by_hand():
@@ -121,18 +111,6 @@ def test_motion_of_the_poses_lays_scans_over_each_other(frames):
     assert errors["as the poses say"] < errors["no motion"] / 1.5 < errors["backwards"]
     with pytest.raises(ArgumentError, match="apart"):
         axes_errors(frames, apart=11)
-
-
-def test_mistakes_with_axes_are_motions_too():
-    T = np.array([[0.0, -1, 0, 3], [1, 0, 0, 2], [0, 0, 1, 1], [0, 0, 0, 1]])
-    moves = {name: mistake(T)[:3, 3].tolist() for name, mistake in AXES.items()}
-    assert moves == {
-        "as the poses say": [3, 2, 1],
-        "left and right swapped": [3, -2, 1],
-        "backwards": [-3, -2, 1],
-        "a quarter turn": [-2, 3, 1],
-        "no motion": [0, 0, 0],
-    }
 
 
 def test_a_gap_of_scans_is_a_gap_in_time_and_checked_around(frames):
@@ -224,16 +202,8 @@ def test_boxes_are_read_by_frame(tmp_path):
     assert read_boxes(path) == {4: [[1, 2, 3, 4], [5, 6, 7, 8]]}
 
 
-def test_committed_result_says_how_it_was_made_and_holds_what_the_lecture_says():
+def test_committed_result_says_how_it_was_made_and_has_a_table():
     result = json.loads(COMMITTED.read_text())
     assert result["command"].startswith("python -m worlds.lecture_13_real_drive")
     assert {"date", "versions", "seed", "minutes"} <= result.keys()
-    sample, *real = result["drives"].values()
-    assert [one["frames"] for one in real] == [24, 37]
-    for one in real:
-        lost = {what: sample["image network"][what] - one["image network"][what] for what in ("lane", "standing")}
-        lost["sure"] = sample["grids"]["confidence"] - one["grids"]["confidence"]
-        assert min(lost["lane"], lost["standing"]) > lost["sure"] > 0
-        assert one["images"]["colour distance"] > max(result["training images"]["colour distance"])
-        assert one["axes"]["left and right swapped"] > 1.3 * one["axes"]["as the poses say"]
     assert "ground: height" in real_drive_table(result)

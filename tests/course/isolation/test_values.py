@@ -3,7 +3,7 @@
 import json
 import math
 from array import array
-from collections import OrderedDict, deque
+from collections import OrderedDict, deque, namedtuple
 from decimal import Decimal
 from enum import Enum, IntEnum
 from fractions import Fraction
@@ -11,6 +11,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import sympy
+import torch
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
@@ -82,9 +83,15 @@ def test_numbers_and_texts_with_names_pass_as_what_they_equal():
 
 def test_what_numpy_takes_for_an_array_passes_as_one():
     strided = np.arange(12.0).reshape(3, 4)[:, ::2]
-    got = decode(encode([strided, np.ma.array([1, 2], mask=[0, 1]), np.ones(2).view(Liar), range(3)]))
+    numbers = np.ones(2, np.longdouble), np.array([1.5, 2], dtype=object), torch.ones(2), np.asfortranarray(strided)
+    sent = [strided, np.ma.array([1, 2], mask=[0, 1]), np.ones(2).view(Liar), range(3), *numbers]
+    got = decode(encode(sent))
+    assert [type(one) for one in got] == [np.ndarray] * len(sent)
+    for one, original in zip(got[2:], sent[2:], strict=True):
+        np.testing.assert_array_equal(one, np.asarray(original, dtype=float))
     np.testing.assert_array_equal(got[0], strided)
-    assert [type(one) for one in got] == [np.ndarray] * 4
+    rows = namedtuple("Rows", ["first", "second"])([1.0, 2.0], [3.0, 4.0])
+    assert decode(encode(rows)) == ([1.0, 2.0], [3.0, 4.0])
 
 
 @pytest.mark.parametrize(
