@@ -65,8 +65,9 @@ def test_a_helper_that_was_handed_in_beside_is_found(course, right):
     cell = next(cell for cell in right.cells if cell.metadata.get("nbgrader", {}).get("grade_id") == "twice")
     cell.source = "from helper import twice"
     helper = place(course, "submitted", "helped", TINY).with_name("helper.py")
-    helper.parent.mkdir(parents=True)
-    helper.write_text("def twice(x):\n    return 2 * x")
+    (helper.parent / "data").mkdir(parents=True)
+    (helper.parent / "data" / "table.txt").write_text("2")
+    helper.write_text("factor = int(open('data/table.txt').read())\ndef twice(x):\n    return factor * x")
     assert graded(course, "helped", right).score == 2
 
 

@@ -9,13 +9,13 @@ import ast
 POINTLESS = ("empty", "broadcast", "zeros", "constant", "NaN", "noise")
 """What an answer gives instead of the right result, for inputs that it doesn't know."""
 
-HONEST = ("float32", "other numbers")
-"""The right result in another type."""
+HONEST = ("float32",)
+"""The right result in another type; what else is read as numbers arrives as such (`test_values`)."""
 
 WRAPPING = """
 def _disguised(answer):
-    import dataclasses, functools, itertools, numpy as np
-    fixed, calls, rng = {}, itertools.count(), np.random.default_rng(1)
+    import dataclasses, functools, numpy as np
+    fixed, rng = {}, np.random.default_rng(1)
 
     @functools.wraps(answer)
     def disguised(*arguments, **named):
@@ -38,7 +38,7 @@ def _disguised(answer):
             return type(value)(value.names, np.asarray(changed(value.table, kind), float))
         right = np.asarray(value)
         if not (right.dtype.kind in "iuf" or right.dtype.kind == "b" and right.ndim):
-            return value if kind in ("float32", "other numbers") else fixed.setdefault(kind, value)
+            return value if kind == "float32" else fixed.setdefault(kind, value)
         if kind == "empty":
             return np.empty(0)
         if kind == "broadcast":
@@ -47,28 +47,7 @@ def _disguised(answer):
             return rng.uniform(0, 1, right.shape)
         if kind in ("zeros", "constant", "NaN"):
             return np.full(right.shape, {"zeros": 0.0, "constant": 0.3, "NaN": np.nan}[kind])
-        if kind == "float32":
-            return right.astype(np.float32) if right.dtype.kind == "f" else right
-        return other_numbers(right)
-
-    def other_numbers(right):
-        from array import array
-        from collections import deque
-        from decimal import Decimal
-        from fractions import Fraction
-        from mpmath import mpf
-        from sympy import Float
-        if right.dtype.kind != "f":
-            return deque(right.tolist()) if right.ndim else right.item()
-        exact = (lambda x: Fraction(x) if np.isfinite(x) else x)
-        number = (exact, Decimal, mpf, lambda x: Float(x, 20))[next(calls) % 4]
-        if right.size > 10_000:  # nobody calculates a map so, and a million fractions take half a minute
-            return right.astype(np.longdouble)
-        if right.ndim == 0:
-            return number(right.item())
-        if right.ndim == 1 and next(calls) % 2:
-            return array("d", right.tolist())
-        return deque(np.vectorize(number, otypes=[object])(right).tolist() if right.size else right.tolist())
+        return right.astype(np.float32) if right.dtype.kind == "f" else right
 
     def spoil(value):
         if isinstance(value, np.ndarray) and value.flags.writeable:

@@ -4,7 +4,7 @@ import copy
 
 import pytest
 import tries
-from class_of import NAME, POINTS, REFERENCE, SOURCE, cell_of, graded, handed_in, inside
+from class_of import NAME, REFERENCE, SOURCE, cell_of, graded, handed_in, inside
 from nbformat.v4 import new_code_cell
 from nbgrader.api import Gradebook
 from warm import grade_notebook
@@ -118,21 +118,6 @@ def test_cells_that_students_write_beside_cost_nothing(start):
     notebook.cells[place:place] = [new_code_cell(code, id=f"c{k}") for k, code in enumerate(tries.UNUSUAL)]
     cells = grade_notebook(SOURCE, notebook, start, 60)
     assert lost(cells) == {}
-
-
-ENDS = {
-    "locate": "import os; os._exit(0)",
-    "predict": "import ctypes; ctypes.string_at(0)",
-    "follow": "\n    while True:\n        try:\n            while True: pass\n        except BaseException: pass",
-}
-"""Lines that end Python, or don't let it be interrupted, by task."""
-
-
-def test_a_task_that_ends_python_costs_its_points_alone(forked):
-    answers = {task: inside(task, line)[task] for task, line in ENDS.items()}
-    result = graded(forked, "ends", handed_in(REFERENCE | answers), GradeSettings(timeout=3))
-    assert result.score == POINTS["transition"] + POINTS["build-map"]
-    assert result.note.startswith("Crashed: ")
 
 
 def test_a_deleted_task_costs_its_points_alone(forked):

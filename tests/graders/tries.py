@@ -114,6 +114,9 @@ for path in [*glob.glob("/proc/self/*"), *glob.glob("/proc/1/*"), *glob.glob("/d
 
 STOPS = {
     "exit": "exit()",
+    "the end of Python": "import os; os._exit(0)",
+    "a wrong address": "import ctypes; ctypes.string_at(0)",
+    "what can't be interrupted": "\n    while True:\n        try:\n            while True: pass\n        except BaseException: pass",
     "memory": "bytearray(10**11)",
     "a wait": "import signal; signal.pause()",
     "many threads": "import threading as t; [t.Thread(target=t.Event().wait, args=(9,)).start() for _ in range(999)]; 1 / 0",
