@@ -17,7 +17,7 @@ import pytest
 import semgrid_edu
 from semgrid_edu.workshop.course.notebooks.build import NOTEBOOKS
 from semgrid_edu.workshop.course.sandbox import limits, linux, resources
-from semgrid_edu.workshop.course.sandbox.limits import Limits
+from semgrid_edu.workshop.course.sandbox.limits import Limits, _all_but
 from semgrid_edu.workshop.course.sandbox.process import StudentProcess
 from semgrid_edu.workshop.course.sandbox.resources import has_ended, namespace_of, processes_in
 
@@ -368,3 +368,13 @@ def test_who_interrupts_its_start_leaves_no_folder(prepared, tmp_path, monkeypat
     with pytest.raises(KeyboardInterrupt):
         StudentProcess(Limits(), prepared)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_all_of_a_folder_but_one_in_it(tmp_path):
+    for name in ("a/hidden/deep", "a/open", "b"):
+        (tmp_path / name).mkdir(parents=True)
+    look, read = _all_but(tmp_path, tmp_path / "a" / "hidden")
+    assert look == [tmp_path, tmp_path / "a"]
+    assert sorted(read) == [tmp_path / "a" / "open", tmp_path / "b"]
+    assert _all_but(tmp_path / "b", tmp_path / "a" / "hidden") == ([], [tmp_path / "b"])
+    assert _all_but(tmp_path / "a" / "hidden" / "deep", tmp_path / "a" / "hidden") == ([], [])
