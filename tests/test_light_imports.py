@@ -6,7 +6,7 @@ Lectures 01 to 05 are asked when they have run: `notebooks/conftest.py`.
 import subprocess
 import sys
 
-ROOMS = ("graphical", "occupancy", "crf", "plotting")
+ROOMS = ("graphical", "occupancy", "planes", "crf", "plotting")
 
 
 def test_no_room_loads_torch_or_scipy_stats():

@@ -18,7 +18,7 @@ from semgrid_edu.camera import Camera
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.datasets.grid_truth import grid_truth
 from semgrid_edu.datasets.samples import sample_image_stage, sample_weights
-from semgrid_edu.errors import DataError
+from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import Frame
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14, LabelSet
@@ -439,6 +439,12 @@ class TestChoice:
     def test_the_shipped_drive_has_one_camera(self):
         result = CliRunner().invoke(app, ["demo", "--camera", "image_03"])
         assert "--camera" in str(result.exception)
+
+
+@pytest.mark.parametrize("wanted", ["4", "a:b", "0:4:0", "9:", "3:2", "1:2:3:4", "-3:", "0:1000", ":7"])
+def test_a_choice_of_no_frame_is_refused(wanted):
+    with pytest.raises(ArgumentError, match=r"--frames.*0:6:2"):
+        ChosenFrames.of(6, wanted)
 
 
 @given(st.integers(1, 400), st.data())

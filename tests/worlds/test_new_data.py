@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from worlds.lecture_13_checks import (
+    AXES,
     axes_errors,
     ground_plane,
     overlay_error,
@@ -111,6 +112,18 @@ def test_motion_of_the_poses_lays_scans_over_each_other(frames):
     assert errors["as the poses say"] < errors["no motion"] / 1.5 < errors["backwards"]
     with pytest.raises(ArgumentError, match="apart"):
         axes_errors(frames, apart=11)
+
+
+def test_mistakes_with_axes_are_motions_too():
+    T = np.array([[0.0, -1, 0, 3], [1, 0, 0, 2], [0, 0, 1, 1], [0, 0, 0, 1]])
+    moves = {name: mistake(T)[:3, 3].tolist() for name, mistake in AXES.items()}
+    assert moves == {
+        "as the poses say": [3, 2, 1],
+        "left and right swapped": [3, -2, 1],
+        "backwards": [-3, -2, 1],
+        "a quarter turn": [-2, 3, 1],
+        "no motion": [0, 0, 0],
+    }
 
 
 def test_a_gap_of_scans_is_a_gap_in_time_and_checked_around(frames):
