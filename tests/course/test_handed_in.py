@@ -67,7 +67,13 @@ def test_a_helper_that_was_handed_in_beside_is_found(course, right):
     helper = place(course, "submitted", "helped", TINY).with_name("helper.py")
     (helper.parent / "data").mkdir(parents=True)
     (helper.parent / "data" / "table.txt").write_text("2")
-    helper.write_text("factor = int(open('data/table.txt').read())\ndef twice(x):\n    return factor * x")
+    code = """
+from pathlib import Path
+assert [*Path().glob("*.ipynb")] == []
+factor = int(Path("data/table.txt").read_text())
+def twice(x): return factor * x
+"""
+    helper.write_text(code)
     assert graded(course, "helped", right).score == 2
 
 
