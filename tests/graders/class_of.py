@@ -13,7 +13,6 @@ SOURCE = NOTEBOOKS / "src" / "exercises" / f"{NAME}.py"
 REFERENCE = {name: code for name, code in reference_answers(SOURCE).items() if name != "parked"}
 """Right answers to the five tasks of code, 13 points; the written one, 2 points, is left out."""
 
-POINTS = {"locate": 2, "predict": 3, "follow": 3, "transition": 3, "build-map": 2}
 SETTINGS = GradeSettings(timeout=5)
 
 

@@ -45,12 +45,12 @@ DRIVEN = st.sampled_from([0.0, 0.6, -0.6, 2.0])
 """How far the vehicle drives, metres."""
 
 
-def random_state(seed: int, spec: GridSpec = GRID, lattice: VelocityLattice = LATTICE) -> BofState:
+def random_state(seed: int, spec: GridSpec = GRID) -> BofState:
     """Return a state in which some cells are crowded and others empty, and any remainder is possible."""
     rng = np.random.default_rng(seed)
-    mass = np.moveaxis(rng.dirichlet(np.full(len(lattice) + 2, 0.1), spec.shape), -1, 0).astype(np.float32)
-    remainder = rng.uniform(-0.5, 0.5, lattice.velocities.shape) * spec.cell
-    return BofState(mass[0], mass[1], mass[2:], lattice.velocities, remainder)
+    mass = np.moveaxis(rng.dirichlet(np.full(len(LATTICE) + 2, 0.1), spec.shape), -1, 0).astype(np.float32)
+    remainder = rng.uniform(-0.5, 0.5, LATTICE.velocities.shape) * spec.cell
+    return BofState(mass[0], mass[1], mass[2:], LATTICE.velocities, remainder)
 
 
 def bin_of(vx: float, vy: float = 0.0) -> int:

@@ -21,9 +21,7 @@ BOTH = pytest.mark.parametrize("sampler_class", [planes.PlaneSampler, fast.Plane
 LOOKING_AHEAD = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0], [0, 0, 0, 1.0]])
 
 
-def _camera(size=(101, 201), focal=100.0):
-    K = np.array([[focal, 0, 100], [0, focal, 50], [0, 0, 1.0]])
-    return Camera(K, LOOKING_AHEAD, size, lidar_height=1.0)
+CAMERA = Camera(np.array([[100.0, 0, 100], [0, 100, 50], [0, 0, 1]]), LOOKING_AHEAD, (101, 201), lidar_height=1.0)
 
 
 def random_points(rng, size, shape=(2, 3, 4)):
@@ -46,7 +44,7 @@ def test_planes_are_at_equal_distances_from_the_ground_up():
 def test_equation_1_by_hand():
     # One cell, its centre 10 m ahead and 2 m to the left: X = -2, Z = 10, and Y = 1 on the ground, 0 at 1 m.
     spec = GridSpec(x_min=9.5, x_max=10.5, y_min=1.5, y_max=2.5, cell=1.0)
-    pixels, visible = plane_pixels(spec, [0.0, 1.0], _camera())
+    pixels, visible = plane_pixels(spec, [0.0, 1.0], CAMERA)
     np.testing.assert_allclose(pixels[:, 0, 0], [[80, 60], [80, 50]])
     assert visible.all()
 
@@ -82,7 +80,7 @@ def test_the_image_border_is_the_centre_of_its_last_pixels(y, height):
     for beyond, inside in ((1.0, True), (1.001, False)):
         left, up = y * beyond, 1 + (height - 1) * beyond
         spec = GridSpec(x_min=9.5, x_max=10.5, y_min=left - 0.5, y_max=left + 0.5, cell=1.0)
-        assert plane_pixels(spec, [up], _camera())[1].item() is inside
+        assert plane_pixels(spec, [up], CAMERA)[1].item() is inside
 
 
 @BOTH
@@ -90,10 +88,10 @@ def test_the_image_border_is_the_centre_of_its_last_pixels(y, height):
 def test_points_beside_the_lens_are_not_visible(sampler_class, ahead):
     # Two cells, their centres half a metre left and right of the lens, and hardly ahead of it.
     spec = GridSpec(x_min=ahead - 0.5, x_max=ahead + 0.5, y_min=-1.0, y_max=1.0, cell=1.0)
-    pixels, visible = plane_pixels(spec, [0.0, 1.0, 2.0], _camera())
+    pixels, visible = plane_pixels(spec, [0.0, 1.0, 2.0], CAMERA)
     assert not visible.any()
     assert np.isnan(pixels).all() == (ahead <= 0)
-    assert (sampler_class(pixels, visible, _camera().size)(torch.ones(1, 3, *_camera().size)) == 0).all()
+    assert (sampler_class(pixels, visible, CAMERA.size)(torch.ones(1, 3, *CAMERA.size)) == 0).all()
 
 
 def test_equation_2_by_hand():
@@ -246,7 +244,7 @@ def test_wrong_inputs_of_samplers_are_named(sampler_class):
 def test_wrong_heights_are_named():
     for heights in ([np.nan], [[0.0]], [np.inf], []):
         with pytest.raises(ArgumentError, match="heights: expected one or more finite metres"):
-            plane_pixels(GridSpec.compact(), heights, _camera())
+            plane_pixels(GridSpec.compact(), heights, CAMERA)
     with pytest.raises(ArgumentError, match="n_planes"):
         plane_heights(0)
     with pytest.raises(ArgumentError, match="spacing"):

@@ -19,7 +19,7 @@ INSTANCES = [[0, 0, 0, 3, 7, 7, 7, 9]]
 CAMERA = Camera(np.diag([100.0, 100.0, 1.0]), np.eye(4), size=(10, 20))
 
 
-def scene(time: float, frames_in_view: int = 20, height: float = 1.0) -> KnownScene:
+def scene(time: float, height: float = 1.0) -> KnownScene:
     """Every cell is hit by two returns at one height."""
     y, x = -3.5 - np.arange(8.0), np.full(8, 2.5)
     points = np.column_stack([x, y, np.full(8, height - KITTI_LIDAR_HEIGHT), np.zeros(8)]).repeat(2, axis=0)
@@ -29,16 +29,15 @@ def scene(time: float, frames_in_view: int = 20, height: float = 1.0) -> KnownSc
     frame = Frame(None, points.astype(np.float32), CAMERA, np.eye(4), time)
     everywhere = np.ones((1, 8), bool)
     left = truth.state == FREE
-    in_view = {3: frames_in_view, 7: frames_in_view, 9: frames_in_view}
-    return KnownScene(frame, PlanarMotion(), truth, everywhere, everywhere, ~everywhere, left, in_view)
+    return KnownScene(frame, PlanarMotion(), truth, everywhere, everywhere, ~everywhere, left, {3: 20, 7: 20, 9: 20})
 
 
-def belief(dynamic: list[float], speed: float = 9.0) -> Belief:
+def belief(dynamic: list[float]) -> Belief:
     """Share every cell between STATIC and DYNAMIC."""
     p = np.zeros((4, 1, 8), np.float32)
     p[DYNAMIC, 0], p[STATIC, 0] = dynamic, 1 - np.array(dynamic)
     velocity = np.zeros((2, 1, 8), np.float32)
-    velocity[0] = speed
+    velocity[0] = 9.0
     return Belief(p, velocity, np.zeros((2, 2, 1, 8), np.float32))
 
 
