@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import softmax
 
-from semgrid_edu.crf import (
-    CrfParams,
-    energy,
-    mean_field_naive,
-    unary_from_probability,
-)
+from semgrid_edu.crf import CrfParams, energy, mean_field_naive, unary_from_probability
 from semgrid_edu.errors import ArgumentError
 
 AS_PRINTED = CrfParams(w_bilateral=2, w_spatial=3, sigma_alpha=2, sigma_beta=0.5, sigma_gamma=1, normalization="none")

@@ -5,14 +5,7 @@ import pytest
 from enumeration import enumerated
 from scipy.special import logsumexp
 
-from semgrid_edu.crf import (
-    CrfParams,
-    exact_marginals,
-    free_energy,
-    log_partition,
-    most_likely,
-    unary_from_probability,
-)
+from semgrid_edu.crf import CrfParams, exact_marginals, free_energy, log_partition, most_likely, unary_from_probability
 from semgrid_edu.errors import ArgumentError
 
 TINY = pytest.mark.parametrize(("classes", "height", "width"), [(2, 4, 4), (3, 2, 3), (5, 1, 1), (1, 2, 2)])

@@ -63,11 +63,6 @@ def unpacked(uri, layout):
     return maps
 
 
-def wide(maps, cell):
-    high, low = np.split(maps[:, *cell].astype(int), 2)
-    return 256 * high + low
-
-
 def test_bytes_hold_what_the_scan_says(maps, stories):
     for story in stories:
         at = (0, *story.cell)
@@ -87,9 +82,10 @@ def test_bytes_hold_classes_and_their_probabilities(maps, stories):
 
 def test_bytes_hold_the_distance_of_each_place(page, stories):
     data = json.loads(page.text["storydata"])
-    places = unpacked(data["places"], data["places_layout"])
+    high, low = unpacked(data["places"], data["places_layout"])["distance"].astype(int)
     for story in stories:
-        assert STEPS["distance"] * wide(places["distance"], story.cell) == pytest.approx(story.scan.distance, abs=0.051)
+        found = 256 * high[story.cell] + low[story.cell]
+        assert STEPS["distance"] * found == pytest.approx(story.scan.distance, abs=0.051)
 
 
 def test_states_sum_to_255_and_none_is_negative():
