@@ -1,10 +1,16 @@
-"""Every labelling of a tiny grid and what it costs, all at once: what exact inference is compared with."""
+"""Random cells, and every labelling of a tiny grid with what it costs: what exact inference is compared with."""
 
 from itertools import product
 
 import numpy as np
 
 from semgrid_edu.crf import energy, pair_weights
+
+
+def random_cells(shape=(3, 2, 3), seed=0):
+    """Return a unary term, (C, H, W), and occupancy probabilities, (4, H, W)."""
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=shape), np.moveaxis(rng.dirichlet(np.ones(4), shape[1:]), -1, 0)
 
 
 def enumerated(unary, values, params):

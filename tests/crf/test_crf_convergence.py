@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from enumeration import enumerated
+from enumeration import enumerated, random_cells
 from scipy.special import logsumexp, softmax, xlogy
 
 from semgrid_edu import fast
@@ -76,8 +76,7 @@ def test_the_kernels_have_no_negative_eigenvalue_which_is_what_the_damping_rests
 def test_all_at_once_ends_in_a_fixed_point_of_one_by_one():
     params = CrfParams(w_bilateral=2, w_spatial=2)
     for seed in range(20):
-        rng = np.random.default_rng(seed)
-        unary, values = rng.normal(size=(3, 3, 3)), np.moveaxis(rng.dirichlet(np.ones(4), (3, 3)), -1, 0)
+        unary, values = random_cells((3, 3, 3), seed)
         settled = mean_field_naive(unary, values, params, iterations=5000, tolerance=1e-15)
         phi, weights, q = unary.reshape(3, -1), pair_weights(values, params), settled.reshape(3, -1)
         np.testing.assert_allclose(softmax(-phi - (1 - q) @ weights, axis=0), q, atol=1e-9, err_msg=f"seed {seed}")
@@ -93,8 +92,7 @@ def test_one_by_one_never_raises_the_free_energy_either():
 def test_one_by_one_is_mean_field_on_the_graph_of_the_crf():
     """The graph's update takes any factors; over the CRF's it is the CRF's own, sweep by sweep."""
     for seed in range(10):
-        rng = np.random.default_rng(seed)
-        unary, values = rng.normal(size=(3, 2, 3)), np.moveaxis(rng.dirichlet(np.ones(4), (2, 3)), -1, 0)
+        unary, values = random_cells((3, 2, 3), seed)
         for sweeps in (1, 3):
             found = mean_field_graph(crf_model(unary, values, CrfParams()), iterations=sweeps).marginals
             expected = mean_field_sequential(unary, values, CrfParams(), sweeps).reshape(3, -1)

@@ -2,18 +2,13 @@
 
 import numpy as np
 import pytest
+from enumeration import random_cells
 from scipy.special import softmax
 
 from semgrid_edu.crf import CrfParams, energy, mean_field_naive, unary_from_probability
 from semgrid_edu.errors import ArgumentError
 
 AS_PRINTED = CrfParams(w_bilateral=2, w_spatial=3, sigma_alpha=2, sigma_beta=0.5, sigma_gamma=1, normalization="none")
-
-
-def small_crf(seed: int, shape: tuple[int, int] = (2, 2), n_classes: int = 2):
-    rng = np.random.default_rng(seed)
-    values = rng.dirichlet(np.ones(4), shape).transpose(2, 0, 1)
-    return rng.normal(size=(n_classes, *shape)), values
 
 
 def test_energy_of_two_by_two_by_hand():
@@ -34,7 +29,7 @@ def test_energy_of_two_by_two_by_hand():
 
 
 def test_one_update_written_as_eq_4_with_loops():
-    unary, values = small_crf(1, (2, 3), 3)
+    unary, values = random_cells((3, 2, 3), 1)
     cells = [(r, c) for r in range(2) for c in range(3)]
     Q, expected = softmax(-unary, axis=0), np.zeros_like(unary)
     for i in cells:
@@ -76,7 +71,7 @@ def test_params_refuse_an_unknown_normalisation():
 
 
 def test_energy_refuses_labels_that_are_no_classes():
-    unary, values = small_crf(0)
+    unary, values = random_cells((2, 2, 2))
     for labels in (
         np.full((2, 2), 2),
         np.full((2, 2), 255),

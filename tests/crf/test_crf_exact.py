@@ -2,26 +2,19 @@
 
 import numpy as np
 import pytest
-from enumeration import enumerated
+from enumeration import enumerated, random_cells
 from scipy.special import logsumexp
 
-from semgrid_edu.crf import CrfParams, exact_marginals, free_energy, log_partition, most_likely, unary_from_probability
+from semgrid_edu.crf import CrfParams, exact_marginals, free_energy, log_partition, most_likely
 from semgrid_edu.errors import ArgumentError
 
 TINY = pytest.mark.parametrize(("classes", "height", "width"), [(2, 4, 4), (3, 2, 3), (5, 1, 1), (1, 2, 2)])
 
 
-def random_cells(seed, classes, height, width):
-    """Networks' scores and occupancy at random."""
-    rng = np.random.default_rng(seed)
-    unary = unary_from_probability(np.moveaxis(rng.dirichlet(np.ones(classes), (height, width)), -1, 0))
-    return unary, np.moveaxis(rng.dirichlet(np.ones(4) / 2, (height, width)), -1, 0)
-
-
 @TINY
 @pytest.mark.parametrize("normalization", ["symmetric", "none"])
 def test_everything_exact_is_what_enumeration_says(classes, height, width, normalization):
-    unary, values = random_cells(0, classes, height, width)
+    unary, values = random_cells((classes, height, width))
     params = CrfParams(sigma_beta=0.5, normalization=normalization)
     labellings, energies = enumerated(unary, values, params)
     assert log_partition(unary, values, params) == pytest.approx(logsumexp(-energies), abs=1e-10)
@@ -32,7 +25,7 @@ def test_everything_exact_is_what_enumeration_says(classes, height, width, norma
 
 
 def test_an_impossible_class_has_no_part_in_it():
-    unary, values = random_cells(3, 3, 2, 2)
+    unary, values = random_cells((3, 2, 2), 3)
     unary[1] = np.inf
     without = np.delete(unary, 1, axis=0)
     np.testing.assert_allclose(
@@ -47,7 +40,7 @@ def test_an_impossible_class_has_no_part_in_it():
 def test_free_energy_is_the_mean_energy_minus_the_entropy():
     """By enumeration, of any Q, with probabilities of 0 among them."""
     for seed in range(5):
-        unary, values = random_cells(seed, 3, 2, 2)
+        unary, values = random_cells((3, 2, 2), seed)
         rng = np.random.default_rng(seed)
         Q = np.moveaxis(rng.dirichlet(np.full(3, 0.3), (2, 2)), -1, 0)
         Q[:, 0, 0] = 0, 1, 0

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from enumeration import random_cells
 from scipy.special import logsumexp, softmax
 
 from semgrid_edu import fast
@@ -36,11 +37,6 @@ OF_MARGINALS = pytest.mark.parametrize("infer", MARGINALS.values(), ids=MARGINAL
 FILTERS = pytest.mark.parametrize("infer", [mean_field, fast.mean_field], ids=["book", "fast"])
 
 
-def crf(shape=(3, 2, 3), seed=0):
-    rng = np.random.default_rng(seed)
-    return rng.normal(size=shape), np.moveaxis(rng.dirichlet(np.ones(4), shape[1:]), -1, 0)
-
-
 def distance_of_free_energy(unary, values, params):
     """F(Q) + log Z, which is KL(Q || P)."""
     Q = mean_field_naive(unary, values, params)
@@ -65,7 +61,7 @@ EVERY = [*MARGINALS.values(), most_likely, log_partition, distance_of_free_energ
 )
 @NORMALIZATIONS
 def test_kernels_without_width_or_weight_leave_each_cell_its_own_distribution(infer, shape, change, normalization):
-    unary, values = crf(shape)
+    unary, values = random_cells(shape)
     params = CrfParams(**change, normalization=normalization)
     params = replace(params, w_spatial=0) if params.w_bilateral == 0 else params
     np.testing.assert_allclose(infer(unary, values, params), softmax(-unary, axis=0), atol=1e-6)
@@ -75,7 +71,7 @@ def test_kernels_without_width_or_weight_leave_each_cell_its_own_distribution(in
 @pytest.mark.parametrize("width", [1e6, 1e300])
 @NORMALIZATIONS
 def test_kernels_of_any_width_weigh_all_pairs_alike(infer, width, normalization):
-    unary, values = crf((3, 4, 3))
+    unary, values = random_cells((3, 4, 3))
     params = CrfParams(4, 3, width, width, width, normalization)
     weight = 7 / 12 if normalization == "symmetric" else 7
     np.testing.assert_allclose(pair_weights(values, params), weight * (1 - np.eye(12)), rtol=1e-9)
@@ -91,7 +87,7 @@ def test_kernels_of_any_width_weigh_all_pairs_alike(infer, width, normalization)
     ("infer", "tolerance"), [(mean_field, 2e-3), (fast.mean_field, 2e-3), (mean_field_naive, 1e-9)]
 )
 def test_one_kernel_without_width_leaves_the_other(infer, tolerance, name):
-    unary, values = crf((3, 8, 6))
+    unary, values = random_cells((3, 8, 6))
     params = replace(CrfParams(), **{name: 1e-6})
     other = replace(params, **{"w_bilateral" if name == "sigma_alpha" else "w_spatial": 0})
     np.testing.assert_allclose(infer(unary, values, params, 500), infer(unary, values, other, 500), atol=tolerance)
@@ -99,7 +95,7 @@ def test_one_kernel_without_width_leaves_the_other(infer, tolerance, name):
 
 @FILTERS
 def test_a_width_below_the_narrowest_changes_nothing(infer):
-    unary, values = crf((3, 8, 6))
+    unary, values = random_cells((3, 8, 6))
     narrowest, half, none = (
         infer(unary, values, CrfParams(sigma_alpha=width, sigma_gamma=width))
         for width in (NARROWEST, NARROWEST / 2, 1e-6)
@@ -110,7 +106,7 @@ def test_a_width_below_the_narrowest_changes_nothing(infer):
 
 @FILTERS
 def test_states_too_far_apart_for_the_lattice_are_an_error_unless_the_kernel_has_no_weight(infer):
-    unary, values = crf()
+    unary, values = random_cells()
     params = CrfParams(sigma_beta=1e-6)
     with pytest.raises(ArgumentError, match="larger sigma"):
         infer(unary, values, params)
@@ -122,7 +118,7 @@ def test_states_too_far_apart_for_the_lattice_are_an_error_unless_the_kernel_has
 @NORMALIZATIONS
 def test_enormous_weights_make_all_cells_agree(weight, normalization):
     """The exact marginals are those of one cell with the sum of all costs; mean field picks a side."""
-    unary, values = crf((3, 2, 3))
+    unary, values = random_cells((3, 2, 3))
     params = CrfParams(weight, weight, 50, 5, 50, normalization)
     together = softmax(-unary.sum(axis=(1, 2)))
     np.testing.assert_allclose(exact_marginals(unary, values, params), np.tile(together, (2, 3, 1)).transpose(2, 0, 1))
@@ -153,7 +149,7 @@ def test_contradictions_whose_probability_is_below_every_number_have_no_exact_an
 
 @pytest.mark.parametrize("shape", [(1, 2, 3), (1, 1, 1)])
 def test_one_class_is_certain(shape):
-    unary, values = crf(shape)
+    unary, values = random_cells(shape)
     for infer in MARGINALS.values():
         np.testing.assert_array_equal(infer(unary, values, CrfParams()), np.ones(shape))
     np.testing.assert_array_equal(most_likely(unary, values, CrfParams()), np.zeros(shape[1:]))
@@ -166,7 +162,7 @@ def test_one_class_is_certain(shape):
 
 @OF_MARGINALS
 def test_an_impossible_class_is_one_that_costs_very_much(infer):
-    unary, values = crf()
+    unary, values = random_cells()
     unary[0, 0, 0] = unary[1, 1] = np.inf
     found = infer(unary, values, CrfParams())
     assert (found[np.isinf(unary)] == 0).all()
@@ -179,7 +175,7 @@ def test_an_impossible_class_is_one_that_costs_very_much(infer):
 @OF_MARGINALS
 @pytest.mark.parametrize("shift", [-1000.0, 1000.0])
 def test_what_is_added_to_all_classes_of_a_cell_changes_nothing_but_the_energy(infer, shift):
-    unary, values = crf()
+    unary, values = random_cells()
     shifted = unary.copy()
     shifted[:, 0, 1] += shift
     np.testing.assert_allclose(infer(shifted, values, CrfParams()), infer(unary, values, CrfParams()), atol=1e-6)
@@ -189,7 +185,7 @@ def test_what_is_added_to_all_classes_of_a_cell_changes_nothing_but_the_energy(i
 
 @OF_MARGINALS
 def test_costs_of_any_size_decide_a_cell(infer):
-    unary, values = crf()
+    unary, values = random_cells()
     np.testing.assert_array_equal(infer(1e300 * unary, values, CrfParams()), unary == unary.min(axis=0))
 
 
@@ -198,7 +194,7 @@ def test_costs_of_any_size_decide_a_cell(infer):
 
 @pytest.mark.parametrize("infer", EVERY)
 def test_neither_layout_nor_kind_of_array_changes_anything(infer):
-    unary, values = crf()
+    unary, values = random_cells()
     expected = infer(unary, values, CrfParams())
     strided = np.repeat(np.repeat(unary, 2, axis=2), 3, axis=0)[::3, :, ::2]
     frozen = unary.copy()
@@ -263,7 +259,7 @@ WRONG_VALUES = {
 @pytest.mark.parametrize("infer", EVERY)
 @pytest.mark.parametrize("wrong", WRONG_UNARIES)
 def test_what_is_no_unary_term_is_an_error_that_names_it(infer, wrong):
-    unary, values = crf()
+    unary, values = random_cells()
     change, message = WRONG_UNARIES[wrong]
     with pytest.raises(ArgumentError, match=rf"^unary: {message}"):
         infer(change(unary), values, CrfParams())
@@ -272,7 +268,7 @@ def test_what_is_no_unary_term_is_an_error_that_names_it(infer, wrong):
 @pytest.mark.parametrize("infer", EVERY)
 @pytest.mark.parametrize("wrong", WRONG_VALUES)
 def test_what_is_no_distribution_of_states_is_an_error_that_names_it(infer, wrong):
-    unary, values = crf()
+    unary, values = random_cells()
     with pytest.raises(ArgumentError, match=r"^values: expected"):
         infer(unary, WRONG_VALUES[wrong](values), CrfParams())
 
@@ -282,6 +278,6 @@ def test_what_is_no_distribution_of_states_is_an_error_that_names_it(infer, wron
 
 @pytest.mark.parametrize("infer", EVERY)
 def test_rounding_of_states_is_forgiven(infer):
-    unary, values = crf((3, 2, 2))
+    unary, values = random_cells((3, 2, 2))
     rounded = values + np.reshape([-5e-4, 0, 4e-4, 0], (4, 1, 1)) * (values[0] > 0.1)
     np.testing.assert_allclose(infer(unary, rounded, CrfParams()), infer(unary, values, CrfParams()), atol=0.02)
