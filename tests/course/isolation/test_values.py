@@ -95,7 +95,8 @@ def test_what_numpy_takes_for_an_array_passes_as_one():
 
 
 @pytest.mark.parametrize(
-    "value", [Fraction(3, 2), Decimal("1.5"), deque([1, 2]), array("d", [1, 2]), mpf(1.5), sympy.Float(1.5), sympy.pi]
+    "value",
+    [Decimal("1.5"), deque([[Fraction(3, 2), 1], [2, 3]]), array("d", [1, 2]), mpf(1.5), sympy.Float(1.5), sympy.pi],
 )
 def test_other_numbers_and_sequences_pass_as_numpy_reads_them(value):
     got = decode(encode((value, [value, 7])))
