@@ -122,14 +122,6 @@ def test_slow_mass_moves_too():
     assert np.isclose(state.occupied[4].max(), 0.5)
 
 
-def test_objects_that_meet_in_a_cell_share_its_probability():
-    """They claim 0.6 + 0.7 of it and get 0.999 in that proportion."""
-    state = predicted(movers({8: (4.0, 0.6), 4: (-4.0, 0.7)}), 2)
-    assert np.isclose(state.occupied[bin_of(4.0), 6, 0], 0.999 * 0.6 / 1.3)
-    assert np.isclose(state.occupied[bin_of(-4.0), 6, 0], 0.999 * 0.7 / 1.3)
-    assert np.allclose(bof_velocity(state)[0][:, 6, 0], [4 * (0.6 - 0.7) / 1.3, 0], atol=1e-6)
-
-
 def test_nothing_is_lost_but_over_the_border_and_nothing_comes_in():
     state = predicted(movers(dict.fromkeys(range(10), (8.0, 0.5))), 2)
     assert np.allclose(state.probability[DYNAMIC, :, 0], 0.5 * (np.arange(10) < 6))
