@@ -16,7 +16,7 @@ import builtins, pathlib, semgrid_edu.workshop.course.answers, sys, tempfile
 np.asarray = np.array = np.zeros = sum
 builtins.len = builtins.enumerate = semgrid_edu.workshop.course.answers.answer_array = lambda *a: None
 sys.modules["numpy"] = None
-for folder in (".", "..", tempfile.gettempdir()):
+for folder in (".", "..", tempfile.gettempdir(), "/dev/shm", "/var/tmp"):
     try: pathlib.Path(folder, "left").write_text("x")
     except OSError: pass
 """
@@ -24,7 +24,8 @@ for folder in (".", "..", tempfile.gettempdir()):
 FINDS = """
 import pathlib, tempfile
 assert "SPOILED" not in globals() and np.zeros(1) == len("") == 0
-assert not any(pathlib.Path(folder, "left").exists() for folder in (".", "..", tempfile.gettempdir()))
+folders = (".", "..", tempfile.gettempdir(), "/dev/shm", "/var/tmp")
+assert not any(pathlib.Path(folder, "left").exists() for folder in folders)
 """
 
 

@@ -46,6 +46,7 @@ def test_no_reply_names_what_was_not_asked_for(session):
 
 
 def test_only_the_students_own_time_counts(session, hostile_answer):
+    assert session.left_in_all <= 20 * session.timeout
     session.timeout = 1
     f = hostile_answer("def f():\n    return 1")
     session.begin()
