@@ -5,15 +5,12 @@ import pytest
 from worlds.lecture_00_street import CLASS_OF, SystemWorld
 from worlds.lecture_14_class_memory import (
     MemoryWorld,
-    class_over_time,
     exact_classes,
     factored_classes,
     frames_worth,
     loss_by_exponent,
     memory_price,
 )  # fmt: skip
-
-from semgrid_edu.graphical import d_separated
 
 
 def test_with_independent_frames_the_factored_filter_is_exact():
@@ -52,10 +49,3 @@ def test_the_best_exponent_is_the_textbooks(frames):
 def test_what_never_changes_and_always_errs_alike_is_worth_one_frame():
     assert frames_worth(100, 1.0) == 1
     assert frames_worth(100, 0.0) == 100
-
-
-def test_errors_are_what_couples_the_frames_beyond_the_cells_content():
-    model = class_over_time(MemoryWorld(steps=2)).model
-    assert not d_separated(model, "z0", "z1", given=("m0", "m1"))
-    assert d_separated(model, "z0", "z1", given=("m0", "m1", "e0"))
-    assert d_separated(model, "l0", "z1", given="m0")
