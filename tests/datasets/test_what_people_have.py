@@ -22,22 +22,27 @@ from semgrid_edu.workshop.paper.datasets import KittiTrackingRun, SynthiaSequenc
 from semgrid_edu.workshop.pose_doubts import path_doubts
 
 READERS = {
-    "KITTI raw": (write_tiny_drive, lambda root: KittiRawDrive(root, DATE, "0001"), "*.bin", ["*/*/*/timestamps.txt"]),
+    "KITTI raw": (
+        write_tiny_drive,
+        lambda root: KittiRawDrive(root, DATE, "0001"),
+        "*.bin",
+        {"*/*/*/timestamps.txt": "2025-12-31 00:00:00.000000000"},
+    ),
     "tracking": (
         lambda root: write_run(root, n_frames=3),
         lambda root: KittiTrackingRun(root, 9),
         "*.bin",
-        ["*/oxts/0009.txt"],
+        {"*/oxts/0009.txt": "48 8 0" + 27 * " 0"},
     ),
     "SemanticKITTI": (
         lambda root: write_images(write_sequence(root) / "sequences" / "00"),
         lambda root: SemanticKittiSequence(root, "00"),
         "*.bin",
-        ["*/00/times.txt", "*/00/poses.txt"],
+        {"*/00/times.txt": "1.0", "*/00/poses.txt": "1 0 0 9 0 1 0 9 0 0 1 9"},
     ),
-    "PandaSet": (write_tiny_pandaset, lambda root: PandasetScene(root, SCENE), "lidar/*.pkl.gz", []),
+    "PandaSet": (write_tiny_pandaset, lambda root: PandasetScene(root, SCENE), "lidar/*.pkl.gz", {}),
 }
-"""Writes three frames, opens them, names of their scans, and the files that have a line for each frame."""
+"""Writes three frames, opens them, names of their scans, and files with a line a frame: what it could be before."""
 
 
 @pytest.mark.parametrize("k", range(3))
@@ -68,9 +73,9 @@ def test_a_clip_may_begin_at_any_frame(tmp_path, reader, lines):
     for path in tmp_path.rglob("*"):
         if path.is_file() and path.stem.isdecimal() and int(path.stem) == 0:
             path.unlink()
-    if lines == "of the clip":
-        for path in (path for pattern in by_line for path in tmp_path.glob(pattern)):
-            path.write_text("".join(path.read_text().splitlines(keepends=True)[1:]))
+    for path, line in ((path, line) for pattern, line in by_line.items() for path in tmp_path.glob(pattern)):
+        before = [] if lines == "of the clip" else [f"{line}\n"]
+        path.write_text("".join(before + path.read_text().splitlines(keepends=True)[1:]))
     clip = opened(tmp_path)
     assert (*clip.numbers, clip.gaps, clip.problems()) == (1, 2, (), [])
     for frame, expected in zip(clip, whole, strict=True):
