@@ -41,11 +41,17 @@ def read_camera(folder: Path, name: str = "image_02") -> Camera:
     """
     K, T_camera_from_camera0, size = read_rectification(folder / "calib_cam_to_cam.txt", name)
     of_lidar = folder / "calib_velo_to_cam.txt"
-    return Camera(K, T_camera_from_camera0 @ read_rigid(of_lidar), size, _read_lidar_height(of_lidar))
+    return Camera(K, T_camera_from_camera0 @ read_rigid(of_lidar), size, read_lidar_height(of_lidar))
 
 
-def _read_lidar_height(path: Path) -> float:
-    """Return the height of the LIDAR above the ground, metres: KITTI's where the file has none."""
+def read_lidar_height(path: Path) -> float:
+    """Return the height of the LIDAR above the ground, metres: KITTI's where the file has none.
+
+    Parameters
+    ----------
+    path : Path
+        A calib_velo_to_cam.txt.
+    """
     calibration = read_calibration(path)
     if LIDAR_HEIGHT not in calibration:
         return KITTI_LIDAR_HEIGHT

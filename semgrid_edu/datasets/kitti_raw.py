@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from semgrid_edu.camera import Camera, invert_rigid
-from semgrid_edu.datasets.calibration import read_camera, read_rectification, read_rigid
+from semgrid_edu.datasets.calibration import read_camera, read_lidar_height, read_rectification, read_rigid
 from semgrid_edu.datasets.drive_files import IMAGE_SUFFIXES, first_sound, numbers_in, photograph, what_is, what_is_in
 from semgrid_edu.datasets.frames import FrameSequence, error_of, read_scan
 from semgrid_edu.datasets.oxts import imu_pose, read_packet, read_timestamps
@@ -278,6 +278,7 @@ class KittiRawDrive(FrameSequence):
         """Yield a reader for each file, so that no error hides another."""
         yield partial(read_rectification, self.date_folder / "calib_cam_to_cam.txt", self.view)
         yield partial(read_rigid, self.date_folder / "calib_velo_to_cam.txt")
+        yield partial(read_lidar_height, self.date_folder / "calib_velo_to_cam.txt")
         yield partial(read_rigid, self.date_folder / "calib_imu_to_velo.txt")
         for path in self._timestamp_files():
             yield partial(self._read_times, path)

@@ -8,13 +8,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from semgrid_edu.camera import Camera
-from semgrid_edu.datasets.index import INDEX_FILE
+from semgrid_edu.datasets.index import INDEX_FILE, load_index
 from semgrid_edu.datasets.label_policies import POLICIES, LidarTruth
 from semgrid_edu.datasets.training_set import Mixture
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.fast import TrainingSet, build_net, load_net
 from semgrid_edu.fast.allocator import keep_freed_memory
 from semgrid_edu.grid import GridSpec
+from semgrid_edu.labels import KITTI_14
 from semgrid_edu.networks import WEIGHTS, Architecture, SemanticGridNet, build_segmenter, load_imagenet, save_net
 from semgrid_edu.networks.build import with_mean_scores
 from semgrid_edu.networks.imagenet import imagenet_file
@@ -213,6 +214,8 @@ def train_network(
     segmenter_alike = build_segmenter(segmenter, n_classes=1, preset=preset)
     if imagenet:
         load_imagenet(segmenter_alike, imagenet)
+    for one in folders:
+        _check_frames(one, params.batch_size, fill_gaps)
 
     keep_freed_memory()
     fabric = open_fabric(device)
@@ -265,6 +268,16 @@ def _check_starts(
         _check_alike(path, replace(kind, label_set=description.label_set), description)
     if sum(kind.n_segmenters for kind in kinds) > MOST_SEGMENTERS:
         raise ArgumentError("--from", f"at most {MOST_SEGMENTERS} image networks together", f"{len(starts)} files")
+
+
+def _check_frames(folder: str | Path, batch_size: int, fill_gaps: bool) -> None:
+    """Check that a data set has a batch of frames to learn from, and unknown classes if gaps are to become unknown."""
+    index = load_index(folder)
+    found = len(index.splits.get("train", ()))
+    if found < batch_size:
+        raise ArgumentError("dataset", f"at least one batch of {batch_size} frames", f"{found} frames")
+    if fill_gaps and index.label_set != KITTI_14:
+        raise ArgumentError("fill_gaps", f"the classes of {KITTI_14.name}", index.label_set.name)
 
 
 def _open(

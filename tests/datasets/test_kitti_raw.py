@@ -238,6 +238,7 @@ def test_a_lidar_below_the_ground_is_named(root):
         file.write("lidar_height: -1.9\n")
     with pytest.raises(DataError, match=r"calib_velo_to_cam.txt: expected lidar_height: metres above the ground"):
         read_all(root)
+    assert any("lidar_height" in problem for problem in KittiRawDrive(root, DATE, "0001").problems())
 
 
 def test_problems_lists_every_broken_file_at_once(root):

@@ -49,8 +49,18 @@ def in_the_place_of_a_data_set(monkeypatch):
 
 @pytest.fixture
 def data(tmp_path):
-    write_text(tmp_path / "minikitti" / "dataset.json", "{}")
+    frames = [{"date": "2026_01_01", "drive": f"{k:04d}", "frame": 0} for k in range(6)]
+    index = {"name": "tiny", "label_set": "KITTI-14", "splits": {"train": frames}}
+    write_text(tmp_path / "minikitti" / "dataset.json", json.dumps(index))
     return tmp_path / "minikitti"
+
+
+def test_gaps_need_unknown_classes_which_is_said_before_the_arrays_are_made(data):
+    index = json.loads((data / "dataset.json").read_text())
+    write_text(data / "dataset.json", json.dumps(index | {"label_set": "SYNTHIA-10"}))
+    command = ["train", "--data", str(data), "--out", str(data.parent / "out"), "--fill-gaps"]
+    with pytest.raises(ArgumentError, match=r"^fill_gaps: expected the classes of KITTI-14, found SYNTHIA-10"):
+        CliRunner().invoke(app, command, catch_exceptions=False)
 
 
 def trained(data, *options):
