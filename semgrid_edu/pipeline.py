@@ -9,8 +9,9 @@ hands to the next.
 """
 
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,10 +150,10 @@ def run_pipeline(
     occupancy, crf, seed, memory
         Parameters of the stages that the package adds, see `Stages.of`.
 
-    Yields
-    ------
-    FrameResult
-        What every stage made of the frame.
+    Returns
+    -------
+    iterator of FrameResult
+        What every stage made of each frame.
 
     Raises
     ------
@@ -170,31 +171,37 @@ def run_pipeline(
     """
     if not isinstance(stages, Stages | SemanticGridNet):
         raise ArgumentError("stages", "a network, or Stages(...) with functions in it", type(stages).__name__)
+    if isinstance(stages, Stages):
+        options = {"occupancy": ("track", occupancy), "seed": ("track", seed or None)}
+        options |= {"crf": ("refine", crf), "memory": ("remember", memory or None)}
+        for name, (stage, value) in options.items():
+            if value is not None and stage in stages.given:
+                raise ArgumentError(name, f"nothing, because the set has a stage `{stage}` already", value)
+    return _results(frames, partial(_completed, stages, occupancy, crf, seed, memory))
+
+
+def _results(frames: Iterable[Frame], stages_for: Callable[[Camera], Stages]) -> Iterator[FrameResult]:
+    """Yield what every stage makes of each frame, by the stages for the camera of the first frame."""
     running = None
     for frame in frames:
         if not isinstance(frame, Frame):
             raise ArgumentError("frames", "the frames of a drive", repr(frame)[:100])
         if running is None:
-            running = _completed(stages, frame.camera, occupancy, crf, seed, memory).started()
+            running = stages_for(frame.camera).started()
         yield run_frame(frame, running)
 
 
 def _completed(
     stages: Stages | SemanticGridNet,
-    camera: Camera,
     occupancy: CmcdotParams | None,
     crf: CrfParams | None,
     seed: int,
     memory: bool | MemoryParams,
+    camera: Camera,
 ) -> Stages:
     """Fill what a set leaves out by the package's fast stages. Parameters are those of `run_pipeline`."""
     if isinstance(stages, SemanticGridNet):
         return Stages.fast(stages, occupancy, crf=crf, seed=seed, memory=memory)
-    options = {"occupancy": ("track", occupancy), "seed": ("track", seed or None)}
-    options |= {"crf": ("refine", crf), "memory": ("remember", memory or None)}
-    for name, (stage, value) in options.items():
-        if value is not None and stage in stages.given:
-            raise ArgumentError(name, f"nothing, because the set has a stage `{stage}` already", value)
     if not set(STAGES) <= set(stages.given):
         stages = stages.over(Stages.fast(load_net(sample_weights(), camera), occupancy, crf=crf, seed=seed))
     if memory is not False:

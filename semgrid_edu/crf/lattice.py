@@ -183,7 +183,7 @@ class PermutohedralLattice:
     def diagonal(self) -> NDArray[np.float64]:
         """k_ii: how much of its value each point gets back, (N,)."""
         half = len(self.blurs) // 2
-        # Each blur is symmetric, so K = given @ taken.T, and only its diagonal is computed.
+        # Each blur is symmetric, so K = taken @ given.T, of which only the diagonal is computed.
         given = reduce(matmul, self.blurs[:half], self.shares)  # what a point splats, after half of the blurs
         taken = reduce(matmul, self.blurs[: half - 1 : -1], self.shares)  # what it slices, from before the other half
         return peak(len(self.blurs) - 1) * (given * taken).sum(axis=1)

@@ -106,7 +106,8 @@ def damping(self_coupling: NDArray) -> NDArray:
 
         log Q'_i = (1 - p_i) log Q_i + p_i (-phi_i - sum_{j != i} k_ij (1 - Q_j)) + constant,   p_i = 1 / (1 + k_ii / 2)
 
-    (compare Kraehenbuehl and Koltun 2013, section 3; Baque et al. 2016).
+    (compare Kraehenbuehl and Koltun 2013, section 3; Baque et al. 2016). All of this holds for a symmetric matrix, as
+    that of `gram_matrix` is. The permutohedral lattice is only nearly symmetric, and F may rise a little.
 
     Parameters
     ----------
@@ -116,8 +117,8 @@ def damping(self_coupling: NDArray) -> NDArray:
     Returns
     -------
     (N,) float
-        p_i, 0 < p_i <= 1; 1 is no damping. With many neighbours in the same state k_ii is small and p_i near 1, so
-        that damping costs little; with `normalization="none"` it is 1 / (1 + (w1 + w2) / 2).
+        p_i, 0 < p_i <= 1; 1 is no damping. The more neighbours in the same state, the smaller is k_ii, and the
+        nearer to 1 is p_i; with `normalization="none"` it is 1 / (1 + (w1 + w2) / 2).
     """
     return 1 / (1 + self_coupling / 2)
 
@@ -197,7 +198,7 @@ def normalise(kernel: NDArray[np.float64]) -> None:
 def mean_field(
     unary: ArrayLike, values: ArrayLike, params: CrfParams, iterations: int = 10, tolerance: float = 0.0, pad: int = 0
 ) -> NDArray[np.float32]:
-    """Approximate the CRF's marginals by mean field with filters (eq. (3), (4)): the updates of `mean_field_naive`.
+    """Approximate the CRF's marginals by mean field with filters (eq. (3), (4)), in place of all pairs.
 
     The sum over all pairs becomes two filters. The spatial one is exact (`SeparableGaussian`). The bilateral one is
     the permutohedral lattice, whose kernel is only nearly Gaussian. Filters include the cell itself, which forms no

@@ -1,4 +1,4 @@
-"""Class beliefs in a map that scrolls under the vehicle: carry what moves, recall, learn from a frame (section 3.2)."""
+"""Class beliefs in a map that scrolls under the vehicle: carry what moves, recall, learn from a frame."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -52,8 +52,8 @@ class MemoryParams:
         nothing about a car that has just come or left, so where the camera sees a cell, only this frame decides on
         them. Elsewhere a remembered one counts as far as the LIDAR finds something (`something_there`).
     least_moving : float
-        Smallest probability of DYNAMIC for a cell to hold something that moves. The default is above the 0.003 that the
-        filter gives anything at first sight, and far below the 0.5 from which the cell is called DYNAMIC.
+        Smallest probability of DYNAMIC for a cell to hold something that moves. The default is far below the 0.5 from
+        which the cell is called DYNAMIC. So an obstacle at first sight, with 0.03 to 0.06, counts as moving, too.
     """
 
     near_exponent: float = 0.7

@@ -85,7 +85,7 @@ class ConvDeconv(nn.Module):
         smallest = 2 ** len(self.encoder)
         if min(x.shape[2:]) < smallest:
             raise ArgumentError("x", f"maps of {smallest} x {smallest} or larger", tuple(x.shape))
-        # Channels last in memory: takes half the time on a CPU, with the same result.
+        # Channels last in memory: faster on a CPU, with the same result up to rounding.
         x = x.contiguous(memory_format=torch.channels_last)
         levels = []
         for encode in self.encoder:

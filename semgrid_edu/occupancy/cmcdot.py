@@ -134,7 +134,8 @@ def local_belief(
     """Look the map up in the vehicle's cells, and update those with the scan; nothing of this goes back to the map.
 
     The vehicle's cells don't coincide with the map's. Because they are updated with evidence on their own grid, each
-    return counts for the very cell that it hit, however the vehicle is turned in the map.
+    return counts for the very cell that it hit, however the vehicle is turned in the map. Cells about which the scan
+    tells nothing keep the prediction, also where `update` has just cleared a wake on the map.
 
     Parameters
     ----------
@@ -190,11 +191,12 @@ def velocity_moments(
     weight = particles.weight[inside].astype(np.float64)
     velocity = particles.velocity[inside].astype(np.float64)
 
+    total = np.bincount(cell, weight, n_cells)
+
     def average(values: NDArray) -> NDArray[np.float64]:
         return np.bincount(cell, weight * values, n_cells) / total
 
     with np.errstate(invalid="ignore"):  # 0 / 0 is NaN, as it should be in cells without particles
-        total = np.bincount(cell, weight, n_cells)
         mean = np.stack([average(velocity[:, 0]), average(velocity[:, 1])])
         dx, dy = velocity.T - mean[:, cell]
         covariance = np.stack([average(dx * dx), average(dx * dy), average(dx * dy), average(dy * dy)])

@@ -358,7 +358,8 @@ class Scan:
         Returns that don't come from the vehicle itself: x and y in the grid frame of the vehicle, and the height above
         the ground there, metres.
     reach : (B,) float
-        How far each beam sees, metres; zero for beams in which nothing came back. Beam 0 begins straight behind the
+        How far each beam sees, metres; zero for beams in which nothing came back, unless the gap is narrow
+        (`fill_gaps`). Beam 0 begins straight behind the
         vehicle, and the beams go counter-clockwise.
     sensor : SensorModel
         The sensor that took the scan.

@@ -155,13 +155,17 @@ MAX_MOVE_PROBABILITY = 1 - 1e-3
 """The largest probability with which something arrives in a cell or has left it: below 1, so a scan can contradict."""
 
 
+TINY = float(np.finfo(np.float64).tiny)
+"""The smallest double by which `ratio` divides: below it a quotient may overflow."""
+
+
 def ratio(part: NDArray, whole: NDArray) -> NDArray[np.floating]:
     """Return part / whole cell by cell, and 0 where the divisor is 0 or so small that the quotient may overflow.
 
     Parameters
     ----------
     part, whole : (..., H, W) float
-        Dividend and divisor, not negative.
+        Dividend and divisor; the divisor isn't negative.
     """
     out = np.zeros(np.broadcast_shapes(np.shape(part), np.shape(whole)), np.result_type(part, whole))
     return np.divide(part, whole, out=out, where=whole >= np.finfo(out.dtype).tiny)

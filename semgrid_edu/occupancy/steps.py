@@ -15,6 +15,7 @@ from semgrid_edu.occupancy.planar_motion import PlanarMotion, look_up
 from semgrid_edu.occupancy.sensor import Evidence
 from semgrid_edu.occupancy.state import (
     MAX_MOVE_PROBABILITY,
+    TINY,
     FilterState,
     Particles,
     State,
@@ -217,7 +218,7 @@ def resample(state: FilterState, spec: GridSpec, params: CmcdotParams, rng: np.r
 
 
 LONGEST = 1e6
-"""Seconds after which nothing changes any more: rates of 1/s have long mixed, and `expm` would lose its digits."""
+"""Longer times count as this, seconds: rates of 1/s have long mixed, and `expm` would lose its digits."""
 
 
 def transition_matrix(world: WorldModel, dt: float) -> NDArray[np.float64]:
@@ -405,5 +406,5 @@ def bayes(prior: NDArray, evidence: Evidence) -> tuple[NDArray[np.float64], NDAr
     joint = np.stack([free, occupied, occupied, free]) * prior
     p_z = joint.sum(axis=0)
     posterior = ratio(joint, p_z)
-    posterior[UNKNOWN] += p_z == 0  # no state that was held possible explains the scan
+    posterior[UNKNOWN] += p_z < TINY  # no state that was held possible explains the scan; `ratio` gave 0
     return posterior, ratio(occupied, p_z)

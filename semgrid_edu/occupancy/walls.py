@@ -46,9 +46,9 @@ class Walls:
     that the moving car itself covers, where P(STATIC) can be one half. So only what is nearly certain is a wall:
     P(STATIC)^4.
 
-    *Hedges.* Hedges fake motion: as the car advances, gaps open at the car's own speed. For a particle at that speed a
-    cell ahead that borders a STATIC one isn't free space; its own cells aren't there yet, so P(STATIC) counts as it is.
-    While the car stands, this doesn't apply.
+    *Hedges.* Hedges fake motion: as the car advances, gaps open along with it. For a particle that, seen from the car,
+    is no faster than a standing thing (`keeps_pace`), a cell ahead that borders a STATIC one isn't free space; its own
+    cells aren't there yet, so P(STATIC) counts as it is. While the car stands, this doesn't apply.
 
     *Wakes.* One thing can't be in two places. So what a moving particle occupied `clearing_time` ago is free now, even
     if no scan sees it.
@@ -98,10 +98,10 @@ class Walls:
         return fraction * path * np.maximum(1, ratio(np.full_like(length, least), length))
 
     def keeps_pace(self, velocity: NDArray, car_velocity: NDArray, cell: float) -> NDArray[np.bool_]:
-        """Return which things move at the car's own speed, (N,).
+        """Return which things could be a gap that the car's own motion opens, (N,).
 
-        ``|v - v_car| <= |v_car|``: relative to the car they are no faster than a standing thing. And they are fast
-        enough to have left their cells within `second_look`. Nothing keeps pace with a car that stands.
+        ``|v - v_car| <= |v_car|``: seen from the car they are no faster than a standing thing. And they are fast enough
+        to have left their cells within `second_look`. Nothing keeps pace with a car that stands.
 
         Parameters
         ----------
@@ -194,7 +194,8 @@ def from_a_wall(static: NDArray, before: NDArray, shortly_before: NDArray, runs:
     before, shortly_before : (N,) int
         The cell of each particle `Walls.clearing_time` ago, and at the second look.
     runs : (N,) bool
-        Whether it is faster than people walk. To it, a wall is nearly certain and one cell wider.
+        Whether it is faster than people walk. Of fast things only P(STATIC)^4 counts, but also that of the eight
+        neighbours.
     """
     wall = static**WALL_EXPONENT
     out_of_a_wall = np.where(runs, at_cells(largest_nearby(wall), before), at_cells(static, before))

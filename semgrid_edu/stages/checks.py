@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,10 @@ from semgrid_edu.stages.hints import file_of, in_short, kind_of, log_sum_hint, s
 
 TOLERANCE = 1e-3
 """How far the probabilities of a cell may be from a sum of 1; the CRF allows the same."""
+
+
+PACKAGE = Path(__file__).parents[1]
+"""The folder of the package."""
 
 
 class StageError(ArgumentError):
@@ -116,14 +121,16 @@ class CheckedStage:
 
 
 def is_ours(stage: object) -> bool:
-    """Return whether a stage is the package's own.
+    """Return whether a stage is the package's own: its code is in a file of the package.
 
     Parameters
     ----------
     stage : callable or Tracker
         The stage.
     """
-    return str(getattr(stage, "__module__", None)).startswith("semgrid_edu.")
+    method = getattr(type(stage), "step", type(stage).__call__)
+    code = getattr(stage, "__code__", None) or getattr(method, "__code__", None)
+    return code is not None and Path(code.co_filename).is_relative_to(PACKAGE)
 
 
 def finite(stage: CheckedStage, values: NDArray) -> None:
@@ -142,7 +149,7 @@ def finite(stage: CheckedStage, values: NDArray) -> None:
 
 
 def class_probabilities(stage: CheckedStage, values: NDArray) -> None:
-    """Reject planes that hold anything but probabilities, such as raw scores.
+    """Reject planes with numbers that are no probabilities, such as raw scores.
 
     Parameters
     ----------

@@ -1,5 +1,6 @@
 """Checks around each stage, and around the two that are stepped frame by frame, `track` and `remember`."""
 
+import copy
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -83,20 +84,10 @@ class CheckedTracker(CheckedStage):
             With velocities that are NaN when the stage returns only probabilities.
         """
         self.frame += 1
-        handed = frame if self.is_ours else self.copied(frame)
+        handed = frame if self.is_ours else copy.deepcopy(frame)
         with self.blamed():
             value = self.stepped.step(handed)
         return self.result(value)
-
-    def copied(self, frame: Any) -> Any:
-        """Return a frame with a scan of its own, which the stage may change.
-
-        Parameters
-        ----------
-        frame : Frame
-            The frame.
-        """
-        return replace(frame, points=frame.points.copy())
 
     def result(self, value: object) -> Any:
         """Return a belief that the next stage can use.
@@ -120,10 +111,6 @@ class CheckedMemory(CheckedTracker):
     """The stage `remember`, stepped frame by frame and checked. Parameters are those of `CheckedTracker`."""
 
     yields = "grid"
-
-    def copied(self, frame: Any) -> Any:
-        """Return a view with a grid of its own. Parameters are those of `CheckedTracker.copied`."""
-        return frame._replace(grid=frame.grid.copy())
 
     def result(self, value: object) -> NDArray[np.float32]:
         """Return a grid of class probabilities. Parameters are those of `CheckedTracker.result`."""

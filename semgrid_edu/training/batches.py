@@ -58,7 +58,7 @@ def draw_batch(
     seed : int
         Seed for the order, the jitter and the mirroring.
     mirror : bool
-        Whether a random half of the batches is mirrored.
+        Whether each batch is mirrored with probability one half.
     tint : float
         How much each colour channel of an image varies independently, as a fraction.
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from lightning_fabric import Fabric
 
 CHECKPOINT_EVERY = 100
-"""Iterations between checkpoints: an interruption loses at most about twenty seconds of work."""
+"""Iterations between checkpoints, which is what an interruption loses at most."""
 
 
 def train(

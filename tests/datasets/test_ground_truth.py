@@ -129,7 +129,7 @@ class TestOwnLabels:
         np.testing.assert_array_equal(one, other)
 
     def test_a_frame_of_the_window_without_labels_is_refused(self):
-        with pytest.raises(ArgumentError, match="image labels of every frame of the window, found none at 0 s"):
+        with pytest.raises(ArgumentError, match="labels of every frame of the window, found none at 0 s"):
             self.cells("own", replace(self.then, labels=None))
 
 

@@ -18,6 +18,7 @@ from worlds.lecture_02_boxes import Box, scan_boxes
 from semgrid_edu import fast, occupancy
 from semgrid_edu.datasets.samples import sample_drive
 from semgrid_edu.errors import ArgumentError
+from semgrid_edu.fast.occupancy import cellwise
 from semgrid_edu.fast.occupancy import cmcdot as fast_cmcdot
 from semgrid_edu.fast.occupancy import particles as fast_particles
 from semgrid_edu.grid import GridSpec
@@ -31,6 +32,7 @@ from semgrid_edu.occupancy import (
     State,
     Walls,
     WorldModel,
+    steps,
 )
 from semgrid_edu.occupancy.cmcdot import velocity_moments
 from semgrid_edu.occupancy.planar_motion import look_up
@@ -148,6 +150,16 @@ def looks_alike(compiled: Particles, book: Particles, walls: Walls, driven: tupl
 def test_update(state, evidence, first_sight, walls):
     world = WorldModel(first_sight=first_sight, walls=walls)
     assert_equal(fast.update(state, GRID, evidence, world), occupancy.update(state, GRID, evidence, world), 1e-4)
+
+
+@pytest.mark.parametrize("static", [0.0, 5e-310, 1e-300])
+def test_the_posterior_is_a_distribution_however_little_explains_the_scan(static):
+    """Only STATIC explains a hit here, and its prior is below or above the smallest normal number."""
+    prior = np.array([1 - static, static, 0, 0]).reshape(4, 1, 1)
+    evidence = Evidence(np.full((1, 1), 0.8), np.zeros((1, 1)))
+    for posterior, _ in (steps.bayes(prior, evidence), cellwise.bayes(prior, evidence.occupied, evidence.free)):
+        np.testing.assert_allclose(posterior.sum(axis=0), 1)
+        assert posterior.argmax() == (State.STATIC if static > 1e-305 else State.UNKNOWN)
 
 
 @pytest.mark.parametrize("both", [0.0, 1e-30, 0.5])

@@ -1,6 +1,6 @@
 """What a stage hands on is checked, whoever wrote it, and the errors name the cause."""
 
-from functools import partial
+from functools import partial, wraps
 from itertools import chain
 
 import numpy as np
@@ -8,12 +8,14 @@ import pytest
 import torch
 from tiny_drive import DATE, write_tiny_drive
 
+from semgrid_edu.crf import mean_field
 from semgrid_edu.datasets import KittiRawDrive
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.networks import Architecture
 from semgrid_edu.occupancy import Belief
 from semgrid_edu.pipeline import StageError, Stages, run_pipeline
+from semgrid_edu.stages.checks import is_ours
 from semgrid_edu.stages.hints import where
 
 C, D, GRID, IMAGE = 14, 2, (3, 5), (6, 20)
@@ -268,6 +270,23 @@ class TestArraysOfItsOwn:
             np.testing.assert_allclose(result.grid, 1 / C, rtol=1e-6)
             np.testing.assert_array_equal(result.scores, 0)
 
+    def test_what_a_stage_with_a_memory_gets(self, frames):
+        def track(frames, spec):
+            for frame in frames:
+                frame.image[:] = 0
+                yield EVENLY
+
+        def remember(views, spec):
+            for view in views:
+                view.belief.probability[:] = np.nan
+                view.frame.points[:] = np.nan
+                yield RIGHT["refine"]
+
+        for result in run_pipeline(frames, stages_with(track=track, remember=remember)):
+            np.testing.assert_array_equal(result.belief.probability, EVENLY)
+            assert np.isfinite(result.frame.points).all()
+            assert result.frame.image.any()
+
     def test_what_comes_out(self, frames):
         def track(frames, spec):
             belief = np.zeros_like(EVENLY)
@@ -306,6 +325,14 @@ class TestFunctions:
         line = evenly.__code__.co_firstlineno
         assert where(evenly) == where(partial(evenly, spec=None)) == f"test_checks.py, line {line}"
         assert where(Stages()) == "an object of class Stages"
+
+    def test_that_wrap_one_of_the_packages_are_still_ones_own(self):
+        @wraps(mean_field)
+        def refine(log_g, o):
+            return log_g
+
+        assert is_ours(mean_field)
+        assert not is_ours(refine)
 
     def test_and_so_are_objects_that_can_be_called(self, frames):
         class Refine:

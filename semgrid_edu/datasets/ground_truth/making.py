@@ -71,7 +71,7 @@ def carry_labels(
 def close_gaps(
     grid: NDArray, cell: float, reach: float = CLOSING_REACH, label_set: LabelSet = KITTI_14
 ) -> NDArray[np.uint8]:
-    """Label the gaps between the LIDAR's rings: the paper's morphological clean-up.
+    """Label the gaps between the LIDAR's rings by the nearest label.
 
     Parameters
     ----------
@@ -101,8 +101,8 @@ def close_and_spread(grid: NDArray, cell: float, label_set: LabelSet = KITTI_14)
     """Label the gaps between the LIDAR's rings, without making objects grow.
 
     The ground continues between the rings, so its labels spread by up to `GROUND_REACH`. If objects spread, they would
-    cover the ground around them. They are closed instead (dilated, then eroded, class by class), which fills gaps up to
-    twice `OBJECT_REACH` wide and doesn't move outlines.
+    cover the ground around them. They are closed instead (dilated, then eroded, class by class), which fills gaps of
+    about twice `OBJECT_REACH`, in whole cells, and doesn't move outlines.
 
     Parameters
     ----------
@@ -126,8 +126,8 @@ def close_and_spread(grid: NDArray, cell: float, label_set: LabelSet = KITTI_14)
     fillable = (grid >= label_set.n_semantic) & (grid != unknown_numbers(label_set)[State.UNKNOWN])
     closed = np.where(fillable, spread, grid)
     for c in set(range(label_set.n_semantic)) - set(flat.tolist()):
-        thing = np.pad(grid == c, margin)
-        closed[fillable & binary_closing(thing, square)[margin:-margin, margin:-margin]] = c
+        thing = binary_closing(np.pad(grid == c, margin), square)
+        closed[fillable & thing[margin : margin + len(grid), margin : margin + grid.shape[1]]] = c
     return closed
 
 

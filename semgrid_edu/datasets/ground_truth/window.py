@@ -45,7 +45,8 @@ class TruthPolicy:
     movers : str
         What happens to returns from moving things in these other scans. "smeared": nothing, so that they stay where the
         thing was. "carved": they are removed. "carried": they are moved to where the thing is now, by the velocity of
-        their cell. The occupancy filter decides what moves, and how fast, because a real drive has no better source.
+        their cell, or removed where that is unknown. The occupancy filter decides what moves, and how fast, because a
+        real drive has no better source.
     deskew : bool
         Whether to undo the motion of the vehicle within a turn of the LIDAR (`deskew_scan`). Use it for scans as a
         scanner records them, such as KITTI's raw ones and the simulated data sets. Scans of one instant, such as the
@@ -169,7 +170,8 @@ def gather_returns(
 def _with_classes(frame: Frame, points: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the points that a frame's camera sees, each with the class of its pixel in place of the reflectance."""
     if frame.labels is None:
-        raise ArgumentError("before, after", "image labels of every frame of the window", f"none at {frame.time:g} s")
+        expected = "image labels of the frame, and with own labels of every frame of the window"
+        raise ArgumentError("frame, before, after", expected, f"none at {frame.time:g} s")
     labels = frame.labels
     check_shape("frame.labels.image", labels.image, frame.camera.size)
     returns, uv = closest_returns(replace(frame, points=points))

@@ -6,7 +6,7 @@ The loops compute with plain numbers and select values without branching, so tha
 import numpy as np
 from numba import njit
 
-from semgrid_edu.occupancy.state import MAX_MOVE_PROBABILITY, State
+from semgrid_edu.occupancy.state import MAX_MOVE_PROBABILITY, TINY, State
 
 FREE, STATIC, DYNAMIC, UNKNOWN = (int(state) for state in State)
 
@@ -192,12 +192,13 @@ def bayes(prior, occupied, free):
             empty = np.float64(prior[FREE, r, c]) + prior[UNKNOWN, r, c]
             full = np.float64(prior[STATIC, r, c]) + prior[DYNAMIC, r, c]
             evidence = if_free * empty + if_occupied * full
-            if_free = if_free / evidence if evidence > 0 else 0.0
-            if_occupied = if_occupied / evidence if evidence > 0 else 0.0
+            explained = evidence >= TINY
+            if_free = if_free / evidence if explained else 0.0
+            if_occupied = if_occupied / evidence if explained else 0.0
             posterior[FREE, r, c] = if_free * prior[FREE, r, c]
             posterior[STATIC, r, c] = if_occupied * prior[STATIC, r, c]
             posterior[DYNAMIC, r, c] = if_occupied * prior[DYNAMIC, r, c]
-            posterior[UNKNOWN, r, c] = if_free * prior[UNKNOWN, r, c] if evidence > 0 else 1.0
+            posterior[UNKNOWN, r, c] = if_free * prior[UNKNOWN, r, c] if explained else 1.0
             factor[r, c] = if_occupied
     return posterior, factor
 

@@ -40,7 +40,7 @@ def reliability(probability: ArrayLike, truth: ArrayLike, n_bins: int = 15) -> R
     truth : (...) int
         The class of each cell; 255 where unlabelled.
     n_bins : int
-        B, the number of bins of equal width between 0 and 1; each includes its upper end.
+        B, the number of bins of equal width between 0 and 1; each includes its upper end, up to rounding.
 
     Returns
     -------

@@ -197,7 +197,9 @@ def checked_confusions(path: str | Path, arrays: Mapping[str, NDArray]) -> Frame
     counts = {name: matrices for name, matrices in arrays.items() if name != DRIVES}
     shapes = {name: matrices.shape for name, matrices in counts.items()}
     if not len(drives) or any(shape != (len(drives), *shape[-1:] * 2) for shape in shapes.values()):
-        raise DataError(path, "confusion matrices (F, C, C) of the frames of F drives", f"{len(drives)} and {shapes}")
+        raise DataError(
+            path, "confusion matrices (F, C, C) of F frames, and the drive of each", f"{len(drives)} and {shapes}"
+        )
     for name, matrices in counts.items():
         if matrices.dtype.kind not in "iu" or (matrices < 0).any():
             raise DataError(path, f"numbers of cells as {name!r}", f"{matrices.dtype}, from {matrices.min()}")

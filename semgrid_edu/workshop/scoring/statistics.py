@@ -14,7 +14,7 @@ Metric = Callable[[NDArray], float]
 
 
 MIN_DRIVES = 10
-"""Fewer drives can't show how much drives vary, so tables get no interval and claims no verdict."""
+"""Fewer drives show too little of how drives vary, so tables get no interval and claims no verdict."""
 
 
 class Interval(NamedTuple):
