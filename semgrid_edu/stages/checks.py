@@ -198,7 +198,7 @@ def log_distribution(stage: CheckedStage, values: NDArray) -> None:
         raise stage.error(wanted, f"{found}: {log_sum_hint(values, total)}")
 
 
-def unsearched(stage: CheckedStage, values: NDArray) -> None:
+def anything(stage: CheckedStage, values: NDArray) -> None:
     """Accept everything. Parameters are those of `finite`."""
 
 

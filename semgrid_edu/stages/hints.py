@@ -27,6 +27,10 @@ REMEMBER = {"remember": ("views", "spec")}
 """The stage that the paper leaves out: without it, classes are forgotten at every frame."""
 
 
+STEPPED = {"track": "frame", "remember": "view"}
+"""The stages that may also be objects with a method `step`, and what it takes."""
+
+
 def check_usage(name: str, stage: object, takes: tuple[str, ...]) -> None:
     """Reject what can't be called as a stage is.
 
@@ -45,11 +49,11 @@ def check_usage(name: str, stage: object, takes: tuple[str, ...]) -> None:
         When it is neither, or takes another number of arguments.
     """
     usage = f"a function {name}({', '.join(takes)})"
-    if "spec" in takes:
-        usage += f" or an object with step({takes[0][:-1]})"
+    if name in STEPPED:
+        usage += f" or an object with step({STEPPED[name]})"
     if isinstance(stage, type):
         raise ArgumentError(name, usage, f"the class {stage.__name__} itself: write {name} = {stage.__name__}(...)")
-    if "spec" in takes and hasattr(stage, "step"):
+    if name in STEPPED and hasattr(stage, "step"):
         return
     if not callable(stage):
         raise ArgumentError(name, usage, f"a {type(stage).__name__}")

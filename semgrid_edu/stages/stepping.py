@@ -14,12 +14,12 @@ from semgrid_edu.networks import Architecture
 from semgrid_edu.occupancy import N_STATES, Belief
 from semgrid_edu.stages.checks import (
     CheckedStage,
+    anything,
     class_probabilities,
     distribution,
     finite,
     is_ours,
     log_distribution,
-    unsearched,
 )
 
 
@@ -48,7 +48,7 @@ def checked(name: str, stage: Any, architecture: Architecture) -> CheckedStage:
         if architecture.uses_return_heights:
             return CheckedStage(name, stage, shape, class_probabilities)
         # Planes hold millions of numbers: ours aren't searched, because finite scores give finite planes.
-        return CheckedStage(name, stage, shape, unsearched if is_ours(stage) else finite)
+        return CheckedStage(name, stage, shape, anything if is_ours(stage) else finite)
     check = log_distribution if name == "fuse" else distribution
     return CheckedStage(name, stage, (n_classes, *spec.shape), check)
 

@@ -18,6 +18,7 @@ from semgrid_edu.datasets.training_set import Mixture, Sample
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.networks import IMAGE_STAGE, WEIGHTS, SemanticGridNet, save_net
 from semgrid_edu.networks.build import plane_sampler
+from semgrid_edu.networks.segmenter import Segmenter
 from semgrid_edu.occupancy import N_STATES
 from semgrid_edu.storage.files import sole_writer
 from semgrid_edu.training.batches import Batch, draw_batch, share_of_batch
@@ -189,8 +190,9 @@ def make_optimiser(net: SemanticGridNet, params: TrainingParams) -> torch.optim.
     params : TrainingParams
         Which optimiser, and its rates.
     """
-    # The published tensors share their memory with the parameters.
-    taught = {tensor.data_ptr() for tensor in getattr(net.segmenter, "imagenet_tensors", dict)().values()}
+    taught = set()
+    if isinstance(net.segmenter, Segmenter):  # the published tensors share their memory with the parameters
+        taught = {tensor.data_ptr() for tensor in net.segmenter.imagenet_tensors().values()}
     learnable = [parameter for parameter in net.parameters() if parameter.requires_grad]
     groups = [
         {"params": [weight for weight in learnable if weight.data_ptr() in taught], "share": params.encoder_rate},
@@ -258,11 +260,14 @@ def _check_dataset(net: SemanticGridNet, dataset: Sequence[Sample], params: Trai
     if params.batch_size % n_processes:
         raise ArgumentError("batch_size", f"a multiple of {n_processes}, the number of processes", params.batch_size)
     size = net.sampler.image_size
-    shape = net.sampler.planes_shape[1:]
-    expected = Sample((3, *size), size, (N_STATES, *shape), shape, (2, *shape))
+    cells = net.sampler.planes_shape[1:]
+    shapes = {"image": (3, *size), "labels": size, "occupancy": (N_STATES, *cells), "truth": cells}
+    if architecture.uses_return_heights:
+        shapes["return_heights"] = (2, *cells)
     for k, sample in enumerate(dataset):
-        if architecture.uses_return_heights and sample.return_heights is None:
-            raise ArgumentError("dataset", "return heights, which the network uses", f"none in frame {k}")
-        for name, part, want in zip(Sample._fields, sample, expected, strict=True):
-            if (part is not None or name != "return_heights") and tuple(part.shape) != want:
-                raise ArgumentError("dataset", f"{name} of shape {want}", f"{tuple(part.shape)} in frame {k}")
+        for name, shape in shapes.items():
+            tensor = getattr(sample, name)
+            if tensor is None:
+                raise ArgumentError("dataset", f"{name}, which the network uses", f"none in frame {k}")
+            if tuple(tensor.shape) != shape:
+                raise ArgumentError("dataset", f"{name} of shape {shape}", f"{tuple(tensor.shape)} in frame {k}")

@@ -50,7 +50,7 @@ def test_a_batch_has_the_heights_of_its_frames_and_shares_them(streets):
 
 
 def test_frames_without_heights_are_refused_before_the_first_step(streets, tmp_path):
-    with pytest.raises(ArgumentError, match=r"dataset: expected return heights, .* found none in frame 0"):
+    with pytest.raises(ArgumentError, match=r"dataset: expected return_heights, .* found none in frame 0"):
         train(build_net(TALL, CAMERA), tiny_streets(), tmp_path / "run", TrainingParams(1, 1, batch_size=2))
     wrong = [sample._replace(return_heights=sample.return_heights[:1]) for sample in streets]
     with pytest.raises(ArgumentError, match=r"dataset: expected return_heights of shape \(2, 24, 12\)"):

@@ -143,8 +143,8 @@ def scores_of_counts(counted: GridCounts, test: TrainingSet) -> dict[str, object
     Returns
     -------
     dict
-        "scores" (see `Scores`), "intervals" (see `Intervals`; None for a single test drive), "confusion" (one matrix
-        per method, one row per true class), and the "classes".
+        "scores" (see `Scores`), "intervals" (see `Intervals`; None with fewer than `MIN_DRIVES` test drives),
+        "confusion" (one matrix per method, one row per true class), and the "classes".
     """
     truth, *_ = truths_of_frames(test)
     counts = {method: counted.confusions.of(method, truth).counts[method] for method in counted.methods}
