@@ -59,7 +59,23 @@ def carry_labels(
     for name, places, size in (("pixels", pixels, labels.size), ("cells", cells, unknown.size)):
         if len(places) and not (min(places) >= 0 and max(places) < size):
             raise ArgumentError(name, f"numbers from 0 to {size - 1}", f"{min(places)} to {max(places)}")
-    classes = labels.ravel()[pixels]
+    return vote(labels.ravel()[pixels], cells, unknown, label_set)
+
+
+def vote(classes: NDArray, cells: NDArray, unknown: NDArray, label_set: LabelSet) -> NDArray[np.uint8]:
+    """Give each cell the class for which its returns vote, by the rule of `LabelSet.most_voted`.
+
+    Parameters
+    ----------
+    classes : (N,) int
+        The class of each return; 255 where unlabelled.
+    cells : (N,) int
+        The cell of each return, counted row by row.
+    unknown : (H, W) uint8
+        The class of each cell that has no labelled return.
+    label_set : LabelSet
+        The classes. Sky doesn't vote.
+    """
     kept = classes != IGNORE
     if "sky" in label_set.names:
         kept &= classes != label_set.index("sky")
@@ -242,12 +258,12 @@ def lidar_truth(
     cells = (rows * spec.shape[1] + cols)[inside]
     classes = returns.classes[inside]
     voters = label_set if policy.vote == "standing" else replace(label_set, flat=())
-    truth = carry_labels(classes, np.arange(len(cells)), cells, probability, voters)
+    states = np.argmax(probability, axis=0)
+    truth = vote(classes, cells, unknown[states], voters)
     if policy.cleanup == "spread":
         truth = close_gaps(truth, spec.cell, label_set=label_set)
     elif policy.cleanup == "close":
         truth = close_and_spread(truth, spec.cell, label_set)
-    states = np.argmax(probability, axis=0)
     if policy.visible_to == "camera":
         truth = np.where(in_sight(frame, spec), truth, unknown[states])
     elif policy.visible_to == "lidar":
