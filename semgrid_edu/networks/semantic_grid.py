@@ -1,7 +1,6 @@
 """The whole network and its description: image and occupancy grid -> semantic grid, end to end (paper, Fig. 2)."""
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 from torch import Tensor, nn
 
@@ -88,24 +87,6 @@ class Architecture:
         return self.label_set, self.image_size, self.grid, self.heights, self.uses_return_heights
 
 
-class NetOutputs(NamedTuple):
-    """What the network computes on the way from image to grid, by the symbols of Fig. 2.
-
-    Parameters
-    ----------
-    scores : (B, C, h, w) float
-        s, the scores of each class at each pixel, before any soft-max.
-    planes : (B, C, D, H, W) float
-        p, the scores on the planes; class probabilities with `uses_return_heights`.
-    logits : (B, C, H, W) float
-        g before the soft-max.
-    """
-
-    scores: Tensor
-    planes: Tensor
-    logits: Tensor
-
-
 class SemanticGridNet(nn.Module):
     """Segment the image, sample its scores on the planes, fuse them with the occupancy grid.
 
@@ -159,14 +140,8 @@ class SemanticGridNet(nn.Module):
             raise ArgumentError("net", expected, "one made by hand, without an architecture")
         return self.architecture
 
-    def stages(
-        self,
-        image: Tensor,
-        occupancy: Tensor,
-        sampler: PlaneSampler | None = None,
-        return_heights: Tensor | None = None,
-    ) -> NetOutputs:
-        """Return the result of every stage, from the scores to the semantic grid.
+    def forward(self, image: Tensor, occupancy: Tensor, return_heights: Tensor | None = None) -> Tensor:
+        """Return the logits of the semantic grid: segment, sample, fuse.
 
         Parameters
         ----------
@@ -174,16 +149,14 @@ class SemanticGridNet(nn.Module):
             RGB, 0..1.
         occupancy : (B, 4, H, W) float
             Probability of FREE, STATIC, DYNAMIC, UNKNOWN; they sum to 1 in each cell.
-        sampler : PlaneSampler, optional
-            s -> p for the camera that took these images; the network's own sampler when left out.
         return_heights : (B, 2, H, W) float, optional
             The lowest and the highest return of each cell, from `cell_heights`. A network with
             `uses_return_heights` needs them; others don't look.
 
         Returns
         -------
-        NetOutputs
-            Scores, planes and logits.
+        (B, C, H, W) float
+            g before the soft-max.
 
         Raises
         ------
@@ -196,12 +169,10 @@ class SemanticGridNet(nn.Module):
             raise ArgumentError("occupancy", f"one for each of the {len(image)} images", len(occupancy))
         if self.uses_return_heights:
             self.check_return_heights(return_heights, len(image))  # before the image network, which takes longest
-        scores = self.segment(image)
-        planes = self.sample(scores, sampler)
-        return NetOutputs(scores, planes, self.fuse(planes, occupancy, return_heights))
+        return self.fuse(self.sample(self.segment(image)), occupancy, return_heights)
 
     def segment(self, image: Tensor) -> Tensor:
-        """Return s, the image network's scores. Parameters are those of `SemanticGridNet.stages`.
+        """Return s, the image network's scores. Parameters are those of `SemanticGridNet.forward`.
 
         Returns
         -------
@@ -213,12 +184,12 @@ class SemanticGridNet(nn.Module):
     def sample(self, scores: Tensor, sampler: PlaneSampler | None = None) -> Tensor:
         """Return p, the scores on the planes; with `uses_return_heights` the class probabilities, see `Architecture`.
 
-        The other Parameters are those of `SemanticGridNet.stages`.
-
         Parameters
         ----------
         scores : (B, C, h, w) float
             s, before any soft-max.
+        sampler : PlaneSampler, optional
+            s -> p for the camera that took these images; the network's own sampler when left out.
 
         Returns
         -------
@@ -231,7 +202,7 @@ class SemanticGridNet(nn.Module):
     def fuse(self, planes: Tensor, occupancy: Tensor, return_heights: Tensor | None = None) -> Tensor:
         """Return the logits of the semantic grid from the sampled planes: (p, o) -> g.
 
-        The other Parameters are those of `SemanticGridNet.stages`.
+        The other Parameters are those of `SemanticGridNet.forward`.
 
         Parameters
         ----------
@@ -262,16 +233,6 @@ class SemanticGridNet(nn.Module):
             found = "none" if return_heights is None else tuple(return_heights.shape)
             raise ArgumentError("return_heights", f"shape {expected}: the network uses return heights", found)
         return return_heights.float()
-
-    def forward(self, image: Tensor, occupancy: Tensor, return_heights: Tensor | None = None) -> Tensor:
-        """Return the logits of the semantic grid. Parameters and errors are those of `SemanticGridNet.stages`.
-
-        Returns
-        -------
-        (B, C, H, W) float
-            g before the soft-max.
-        """
-        return self.stages(image, occupancy, return_heights=return_heights).logits
 
 
 def _fresh_fusion(n_scores: int, n_planes: int, n_classes: int, options: Architecture, seed: int) -> nn.Module:

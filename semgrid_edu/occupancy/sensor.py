@@ -433,8 +433,8 @@ def edge_of_splits(points: NDArray, edge: float) -> float:
         `SensorModel.edge`. It becomes 0 if most returns have reflectance 0, because a scanner that doesn't measure
         reflectance writes 0 everywhere; KITTI's has 15 % of them.
     """
-    measured = points.shape[1] < 4 or np.count_nonzero(points[:, 3]) >= len(points) / 2
-    return edge if measured else 0.0
+    dark = np.count_nonzero(points[:, 3:4] == 0)
+    return 0.0 if dark > len(points) / 2 else edge
 
 
 def without_own_returns(points: NDArray, sensor: SensorModel) -> NDArray:

@@ -37,17 +37,16 @@ def inputs():
 
 def test_the_conv_deconv_network_sees_picked_probabilities_states_and_heights(net, inputs):
     image, occupancy, heights = inputs
-    seen = net.stages(image, occupancy, return_heights=heights)
-    torch.testing.assert_close(seen.planes, net.sampler(seen.scores.softmax(dim=1)))
-    picked = pick_planes(seen.planes, heights, SMALL.heights)
+    planes = net.sampler(net.segmenter(image).softmax(dim=1))
+    logits = net(image, occupancy, heights)
+    picked = pick_planes(planes, heights, SMALL.heights)
     above = above_ground(heights, 1.0).nan_to_num(0).clamp(0, 5) / 2.5
     joined = torch.cat([picked, occupancy, above, (~heights[:, :1].isnan()).float()], dim=1)
     assert joined.shape[1] == 2 * 14 + 4 + 3
     both = (picked > 0).any(dim=1, keepdim=True) & ~heights[:, :1].isnan()
-    lowered = torch.zeros_like(seen.logits)
+    lowered = torch.zeros_like(logits)
     lowered[:, KITTI_14.n_semantic :] = 20 * both
-    torch.testing.assert_close(seen.logits, net.fusion.conv_deconv(joined) - lowered)
-    assert torch.equal(seen.logits, net(image, occupancy, heights))
+    torch.testing.assert_close(logits, net.fusion.conv_deconv(joined) - lowered)
 
 
 def test_only_a_cell_in_view_with_a_return_must_have_a_name(net, inputs):

@@ -49,13 +49,15 @@ def test_the_reduction_is_a_1x1_convolution_of_all_planes():
 
 def test_stages_follow_each_other(small_net, batch):
     image, occupancy, _ = batch
-    stages = small_net.stages(image, occupancy)
-    assert stages.scores.shape == (2, N_CLASSES, 16, 24)
-    assert stages.planes.shape == (2, N_CLASSES, 4, 10, 9)
-    assert stages.logits.shape == (2, N_CLASSES, 10, 9)
-    torch.testing.assert_close(stages.scores, small_net.segmenter(image))
-    torch.testing.assert_close(stages.planes, small_net.sampler(stages.scores))
-    torch.testing.assert_close(stages.logits, small_net(image, occupancy))
+    scores = small_net.segment(image)
+    planes = small_net.sample(scores)
+    logits = small_net(image, occupancy)
+    assert scores.shape == (2, N_CLASSES, 16, 24)
+    assert planes.shape == (2, N_CLASSES, 4, 10, 9)
+    assert logits.shape == (2, N_CLASSES, 10, 9)
+    torch.testing.assert_close(scores, small_net.segmenter(image))
+    torch.testing.assert_close(planes, small_net.sampler(scores))
+    torch.testing.assert_close(logits, small_net.fusion(planes, occupancy))
 
 
 def test_a_mirror_exchanges_left_and_right_for_the_learnt_parts_alone(small_net, batch):

@@ -70,7 +70,7 @@ def test_several_image_networks_come_back_and_their_scores_are_averaged(net, cam
     image, occupancy = _inputs(SMALL)
     each = [member(image) for member in loaded.segmenter.members]
     assert not torch.equal(*each)
-    torch.testing.assert_close(loaded.stages(image, occupancy).scores, torch.stack(each).mean(dim=0))
+    torch.testing.assert_close(loaded.segment(image), torch.stack(each).mean(dim=0))
     assert torch.equal(loaded(image, occupancy), mean(image, occupancy))
 
 
