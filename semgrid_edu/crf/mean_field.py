@@ -234,7 +234,9 @@ def mean_field(
     """
     unary, values = check_inputs(unary, values)
     check_stop(iterations, tolerance)
-    unary, values = (with_border(maps, pad) for maps in (unary, values))
+    if pad:
+        padded = [with_border(maps, pad) for maps in (unary, values)]
+        return mean_field(*padded, params, iterations, tolerance)[:, pad:-pad, pad:-pad]
     spatial = SeparableGaussian.build(unary.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
     bilateral = bilateral_kernel(values, params)
     self_coupling = bilateral.diagonal + spatial.diagonal
@@ -244,8 +246,7 @@ def mean_field(
     def disagreement(Q: NDArray) -> NDArray:
         return self_coupling * Q - (bilateral(Q.T) + spatial(Q.T)).T
 
-    Q = settled(updates(unary, disagreement, self_coupling), iterations, tolerance)
-    return without_border(Q, pad).astype(np.float32)
+    return settled(updates(unary, disagreement, self_coupling), iterations, tolerance).astype(np.float32)
 
 
 def with_border(maps: NDArray, pad: int) -> NDArray:
@@ -264,26 +265,7 @@ def with_border(maps: NDArray, pad: int) -> NDArray:
         The same maps with a border.
     """
     check_whole(pad=pad)
-    return np.pad(maps, ((0, 0), (pad, pad), (pad, pad)), mode="edge") if pad else maps
-
-
-def without_border(maps: NDArray, pad: int) -> NDArray:
-    """Cut off what `with_border` added.
-
-    Parameters
-    ----------
-    maps : (K, H + 2 pad, W + 2 pad) float
-        K numbers for each cell.
-    pad : int
-        Number of cells to cut off on each side.
-
-    Returns
-    -------
-    (K, H, W) float
-        The maps without their border.
-    """
-    _, height, width = maps.shape
-    return maps[:, pad : height - pad, pad : width - pad]
+    return np.pad(maps, ((0, 0), (pad, pad), (pad, pad)), mode="edge")
 
 
 def check_inputs(unary: ArrayLike, values: ArrayLike) -> tuple[NDArray[np.floating], NDArray[np.floating]]:

@@ -40,7 +40,9 @@ def kernels(values: ArrayLike, params: CrfParams) -> tuple[NDArray[np.float64], 
     occupancy = values.reshape(len(values), -1).T
     both = np.hstack([place / params.sigma_alpha, occupancy / params.sigma_beta])
     alone = place / params.sigma_gamma
-    return np.exp(-cdist(both, both, "sqeuclidean") / 2), np.exp(-cdist(alone, alone, "sqeuclidean") / 2)
+    on_both = np.exp(-cdist(both, both, "sqeuclidean") / 2)
+    on_place = np.exp(-cdist(alone, alone, "sqeuclidean") / 2)
+    return on_both, on_place
 
 
 def gram_matrix(values: ArrayLike, params: CrfParams) -> NDArray[np.float64]:

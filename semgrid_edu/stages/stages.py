@@ -7,7 +7,6 @@ import copy
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import wraps
 from typing import Any, Protocol
 
 import numpy as np
@@ -257,7 +256,6 @@ def _on_arrays(function: Callable) -> Callable:
     """Return a function of batches as one of numpy arrays, for one frame at a time, without gradients."""
 
     @torch.inference_mode()
-    @wraps(function)
     def stage(*arrays: NDArray) -> NDArray:
         batches = [torch.from_numpy(np.asarray(array, dtype=np.float32))[None] for array in arrays]
         return function(*batches)[0].numpy()

@@ -10,17 +10,15 @@ from semgrid_edu.datasets.training_set import Sample
 from semgrid_edu.errors import ArgumentError
 from semgrid_edu.grid import GridSpec
 from semgrid_edu.labels import KITTI_14
-from semgrid_edu.workshop.scoring.grids import (
-    classes_of_states,
+from semgrid_edu.workshop.scoring.flat_ground import (
     count_labels_and_states,
     ground_labels,
     ground_pixels,
     inverse_perspective,
     joint_table,
-    majority_by_state,
-    majority_class,
     naive_bayes,
 )
+from semgrid_edu.workshop.scoring.grids import classes_of_states, majority_by_state, majority_class
 
 ROAD, WALK, CAR, SKY = (KITTI_14.index(name) for name in ("road", "sidewalk", "car", "sky"))
 FREE, STATIC, DYNAMIC, UNOBSERVED = 10, 11, 12, 13

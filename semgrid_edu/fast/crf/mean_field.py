@@ -5,7 +5,7 @@ from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from semgrid_edu.crf.lattice import bilateral_features
-from semgrid_edu.crf.mean_field import NEVER, check_inputs, check_stop, damping, with_border, without_border
+from semgrid_edu.crf.mean_field import NEVER, check_inputs, check_stop, damping, with_border
 from semgrid_edu.crf.params import CrfParams
 from semgrid_edu.fast.crf import FAST, exponential
 from semgrid_edu.fast.crf.lattice import PermutohedralLattice
@@ -34,11 +34,12 @@ def mean_field(
     """
     unary, values = check_inputs(unary, values)
     check_stop(iterations, tolerance)
-    unary, values = (with_border(maps, pad) for maps in (unary, values))
+    if pad:
+        padded = [with_border(maps, pad) for maps in (unary, values)]
+        return mean_field(*padded, params, iterations, tolerance)[:, pad:-pad, pad:-pad].copy()
     spatial = SeparableGaussian.build(unary.shape[1:], params.sigma_gamma, params.w_spatial, params.normalization)
     phi = _above_best(np.require(unary, requirements="CW"))
-    Q = iterate(phi, bilateral_kernel(values, params), spatial, iterations, tolerance)
-    return without_border(Q, pad).copy() if pad else Q
+    return iterate(phi, bilateral_kernel(values, params), spatial, iterations, tolerance)
 
 
 def iterate(

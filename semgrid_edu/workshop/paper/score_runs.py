@@ -34,14 +34,13 @@ from semgrid_edu.workshop.scoring.confusions import (
     save_confusions,
     seed_confusions,
 )
+from semgrid_edu.workshop.scoring.flat_ground import RULES, label_and_state
 from semgrid_edu.workshop.scoring.grids import (
     MAJORITY,
     NETWORK,
     OCCUPANCY_ALONE,
-    RULES,
     Refine,
     baseline_grids,
-    label_and_state,
     network_grids,
 )
 
