@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from semgrid_edu.camera import KITTI_LIDAR_HEIGHT, Camera, lidar_from_grid
 from semgrid_edu.datasets.index import INDEX_FILE
-from semgrid_edu.datasets.kitti_raw import WITH_GAPS
+from semgrid_edu.datasets.kitti_labels import WITH_GAPS
 from semgrid_edu.datasets.pandaset import PandasetScene
 from semgrid_edu.errors import ArgumentError, DataError
 from semgrid_edu.frame import LABEL_GRID, resize_image

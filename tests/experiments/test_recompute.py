@@ -24,7 +24,7 @@ from semgrid_edu.workshop.paper import reproduce as reports
 from semgrid_edu.workshop.paper.data_runs import RECIPE_OF, DataRun
 from semgrid_edu.workshop.paper.experiments import EXPERIMENTS
 from semgrid_edu.workshop.paper.other_runs import FRAME, OVERTURNED, STEP, TIMES, UPRIGHT, OverturnedRun, TimeRun
-from semgrid_edu.workshop.paper.reproduce import check_results
+from semgrid_edu.workshop.paper.recompute import check_results
 from semgrid_edu.workshop.paper.run import ENDED, with_needs
 from semgrid_edu.workshop.paper.run_counts import RunCounts
 from semgrid_edu.workshop.paper.scales import SCALES, Scale

@@ -21,7 +21,7 @@ from semgrid_edu.workshop.paper.figures import (
     figures_picture,
     shown_frames,
 )
-from semgrid_edu.workshop.paper.reproduce import differences
+from semgrid_edu.workshop.paper.recompute import differences
 from semgrid_edu.workshop.paper.run_counts import RunCounts
 from semgrid_edu.workshop.paper.scales import SCALES
 from semgrid_edu.workshop.scoring.confusions import FrameConfusions

@@ -22,7 +22,7 @@ def check(
     folder: Annotated[Path, typer.Argument(help="Results of the paper's experiments, such as docs/results/reduced.")],
 ) -> None:
     """Compute results again from their counts; say what differs."""
-    from semgrid_edu.workshop.paper.reproduce import check_results
+    from semgrid_edu.workshop.paper.recompute import check_results
 
     if not check_results(folder, typer.echo):
         raise typer.Exit(1)

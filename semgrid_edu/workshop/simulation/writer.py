@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from semgrid_edu.datasets.kitti_raw import DEPTH_UNIT, KINDS, drive_folder
+from semgrid_edu.datasets.kitti_labels import DEPTH_UNIT, KINDS
+from semgrid_edu.datasets.kitti_raw import drive_folder
 from semgrid_edu.datasets.project_lidar import depth_scan
 from semgrid_edu.errors import DataError
 from semgrid_edu.frame import FrameLabels
