@@ -51,6 +51,11 @@ def read_lidar_height(path: Path) -> float:
     ----------
     path : Path
         A calib_velo_to_cam.txt.
+
+    Raises
+    ------
+    DataError
+        When it isn't one positive number.
     """
     calibration = read_calibration(path)
     if LIDAR_HEIGHT not in calibration:

@@ -148,6 +148,11 @@ def fit(
     ------
     Step
         After each step; the network has changed.
+
+    Raises
+    ------
+    ArgumentError
+        When the loss isn't finite, from which training can't recover.
     """
     samplers = _samplers(net, dataset, fabric.device)
     with _freezing(net) as learnable:
